@@ -24,11 +24,11 @@ if not __package__:
     sys.path[0] = str(Path(__file__).parents[1])
 
 from ppafo.constants import PASCALS_PER_PSI
+from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.tolerances import Tolerances
 from ppafo.identification.trajectory.experiment import (
     FITTED_CHANNELS,
     FittedExperiment,
-    FreeParameter,
     TrajectoryProblem,
     number_at,
     numbers_of,
@@ -154,7 +154,7 @@ def problem_of(recordings: Sequence[Recording], random: np.random.Generator, sta
         for label, scenario, recording in zip(labels, scenarios(), recordings, strict=True)
     )
     sought = tuple(
-        FreeParameter(path, start=value * math.exp(random.uniform(-0.3, 0.3)), low=value / 10.0, high=value * 10.0)
+        FitNumber(path, start=value * math.exp(random.uniform(-0.3, 0.3)), low=value / 10.0, high=value * 10.0)
         for path, value in SOUGHT.items()
     )
     stated = stated_by(load_parameter_set("ppafo2011"), experiments[0].scenario) if states else {}
@@ -174,13 +174,13 @@ def of_model(kind: str, random: np.random.Generator, supply_error: float = 0.0) 
     clean = [noisy(simulate(one).recording, "white", random) for one in scenarios(truth_in_words())]
     problem = problem_of(clean, random)
     numbers = numbers_of(problem)
-    truth = np.array([item.free.start for item in numbers])
+    truth = np.array([item.start for item in numbers])
     for place, item in enumerate(numbers):
         if item.path.startswith("supply.") and supply_error:
             truth[place] += supply_error
         elif item.is_tolerance:
-            moved = truth[place] + item.free.deviation * math.sqrt(3.0) * random.uniform(-1.0, 1.0)
-            truth[place] = min(max(moved, item.free.low), item.free.high)
+            moved = truth[place] + item.deviation * math.sqrt(3.0) * random.uniform(-1.0, 1.0)
+            truth[place] = min(max(moved, item.low), item.high)
         else:
             truth[place] = SOUGHT[item.path.replace("valves.proportional.", "valve.")]
     prepared = [prepare(one, numbers_in(one.label, numbers, truth)) for one in problem.experiments]

@@ -19,11 +19,11 @@ from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.estimate import NAMED
+from ppafo.identification.estimate import NAMED, UNKNOWN, Estimate, Verdict, in_shown_unit, relative_half_width
 from ppafo.identification.least_squares import (
     SHORT,
+    FitNumber,
     FitRuns,
-    FitVariable,
     Flags,
     Indices,
     Linear,
@@ -80,6 +80,12 @@ _CONVERGED = 0.5
 """Decrease of the squares in the last step [-] below which the search has converged within the standard errors."""
 _AT_BOUND = 1.0e-6
 """Largest distance of a variable from its bound [-] that counts as at the bound, relative above 1."""
+_OWN_SHARE = 0.2
+"""Weight in an undetermined combination [-] from which a number itself counts as not identifiable."""
+_NEAR = 1.0e-3
+"""Distance from a bound [widths of the interval] up to which an estimate counts as at its bound."""
+_NONE = 0.1
+"""Upper end of an interval that begins at zero [typical magnitudes], below which the part is none."""
 _BETTER = 1.0
 """Increase of the log-likelihood [-] above which another start replaces the result; equal optima do not."""
 _OTHER_STARTS = 32
@@ -219,7 +225,7 @@ class Fit:
     with the direction, 1 upwards or -1 downwards; such a search has not converged.
     """
 
-    numbers: tuple[FitVariable, ...]
+    numbers: tuple[FitNumber, ...]
     values: Floats
     covariance: Floats
     low: Floats
@@ -244,7 +250,7 @@ class Fit:
 @on_one_thread
 def fit(
     residuals: Residuals,
-    numbers: Sequence[FitVariable],
+    numbers: Sequence[FitNumber],
     blocks: Sequence[ResidualBlock],
     confidence: float = 0.95,
     report: Report = report_nothing,
@@ -492,6 +498,61 @@ def _other_starts(runs: FitRuns, fitted: Fit) -> Iterator[Floats]:
     costs = np.sum(np.log1p(np.square(residuals / np.concatenate(noise)[:, None])), axis=0)
     costs[~np.isfinite(costs)] = np.inf
     yield from (points[:, index] for index in np.argsort(costs)[:2].tolist() if costs[index] < costs[-1])
+
+
+def estimate_of(fitted: Fit, row: int, recordings: Sequence[str], conflict: str) -> Estimate:
+    """Return the estimate of the number in a row of a fit, with verdict and explanation.
+
+    ``conflict`` is a sentence on readings that the model does not explain, empty if it explains all.
+    """
+    number = fitted.numbers[row]
+    value, low, high = (float(column[row]) for column in (fitted.values, fitted.low, fitted.high))
+    bounds = max(number.low, fitted.by_name.get(number.base, -math.inf)), number.high
+    width = relative_half_width(value, low, high, number.size)
+    exact, near = _AT_BOUND * number.scale, _NEAR * (high - low) if math.isfinite(high - low) else 0.0
+    bound = next((end for end in bounds if abs(value - end) <= max(exact, near)), None)
+    # Not 1e-17 where 0 is meant.
+    value = bound if bound is not None and abs(value - bound) <= exact else value
+    # A part whose interval begins at its bound of zero cannot be distinguished from no part.
+    is_part = number.size is not None and number.low == 0.0 >= low
+    if is_part and high < _NONE * (number.size or 0.0):
+        value = bound = 0.0
+    combination = next((each for each in fitted.unidentified if abs(each.get(number.name, 0.0)) >= _OWN_SHARE), None)
+    verdict: Verdict = "holds for this model only" if conflict else "identified"
+    text, why = number.text, widened_by(fitted, number.name)
+    if bound == 0.0 and number.size is not None and width < UNKNOWN:
+        text = f"{text}: none"
+    elif combination is not None and not text:
+        verdict = "not identifiable"
+        # So far from where it was linearised the interval of a straight line means nothing.
+        low, high = min(low, bounds[0]), max(high, bounds[1])
+        others = [other for other in combination if other != number.name]
+        # Where the model lacks something, that may be what moves a number so far from its start.
+        silent = conflict or "the recordings are hardly sensitive to this parameter"
+        why = f"trades off against {' and '.join(others)}" if others else silent
+    elif bound is not None and not number.base:
+        verdict = "at its bound"
+        why = f"the recordings favour a value at or beyond {_shown(bound, number.unit)}"
+    elif width >= UNKNOWN or is_part:
+        verdict, why = "not identifiable", f"{why}; the interval includes zero or twice the value"
+    elif conflict and not text:
+        # Said of every number: which of them the missing physics moves is not known.
+        why = conflict
+    elif number.base and low <= bounds[0]:
+        why = f"{why}; the interval contains its bound, {number.base}"
+    else:
+        ends = zip(bounds, (low, high), strict=True)
+        cut = [bound for bound, end in ends if abs(end - bound) <= _AT_BOUND * abs(end)]
+        why += f"; the interval ends at its bound, {_shown(cut[0], number.unit)}" if cut else ""
+    why = f"{text}; {why}." if text else why
+    size, confidence = number.size, fitted.confidence
+    return Estimate(number.name, value, number.unit, low, high, verdict, why, tuple(recordings), confidence, size)
+
+
+def _shown(value: float, unit: str) -> str:
+    """Return a value [SI] as text in its display unit."""
+    number, shown = in_shown_unit(value, unit)
+    return f"{number:.6g} {shown}".rstrip(" -")
 
 
 def widened_by(fitted: Fit, name: str) -> str:

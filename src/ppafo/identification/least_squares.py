@@ -59,22 +59,41 @@ _UNDETERMINED = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class FitVariable:
-    """Variable of a fit: start, bounds and typical magnitude ``scale``, in SI units.
+class FitNumber:
+    """Number of a fit in SI units: an unknown, or a quantity known within a tolerance (``is_tolerance``).
 
-    ``deviation`` is the standard deviation of its prior about the start: infinite for an unknown, finite for a
-    tolerance. Tolerances of one ``family``, such as the friction in each recording, are tested together. With a
-    ``base``, the name of another variable of the same scale, start and bounds are of the excess over that variable.
+    ``path`` is that of a parameter set where it has one; ``recordings`` are the labels of the recordings in which it
+    acts, empty for all. ``start`` and the bounds may be nan where a declaration gives them; ``scale`` is a typical
+    magnitude. ``deviation`` is the standard deviation of its prior about the start, infinite for none. With
+    ``is_logarithm`` the natural logarithm is varied, to which the deviation refers. Tolerances of one ``family``, such
+    as the friction in each recording, are tested together. With a ``base``, the name of another number of the same
+    scale, start and bounds are of the excess over that number. A number with a ``text`` is reported, in its ``unit``;
+    ``size`` is a typical magnitude of one that may be zero, for which zero is a valid result and not a bound.
     """
 
-    name: str
-    start: float
-    low: float
-    high: float
-    scale: float
+    path: str
+    start: float = math.nan
+    low: float = math.nan
+    high: float = math.nan
+    scale: float = 1.0
     deviation: float = math.inf
+    recordings: tuple[str, ...] = ()
+    is_tolerance: bool = False
+    is_logarithm: bool = False
     family: str = ""
     base: str = ""
+    unit: str = ""
+    text: str = ""
+    size: float | None = None
+
+    @property
+    def name(self) -> str:
+        """Path, followed by the labels of the recordings if the number is limited to some of them."""
+        return f"{self.path} of {', '.join(self.recordings)}" if self.recordings else self.path
+
+    def acts_in(self, label: str) -> bool:
+        """Return whether the number acts in the recording with this label."""
+        return not self.recordings or label in self.recordings
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +124,7 @@ class FitRuns:
     def __init__(
         self,
         residuals: Residuals,
-        numbers: tuple[FitVariable, ...],
+        numbers: tuple[FitNumber, ...],
         blocks: tuple[ResidualBlock, ...],
         report: Report,
         memory: int,

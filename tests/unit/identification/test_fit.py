@@ -7,7 +7,7 @@ import pytest
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.fit import SMOOTH, Fit, fit
-from ppafo.identification.least_squares import FitVariable, ResidualBlock
+from ppafo.identification.least_squares import FitNumber, ResidualBlock
 from ppafo.identification.noise import Noise, burg, noise_of, whiten
 from ppafo.signals.recording import Floats
 
@@ -21,12 +21,12 @@ _BLOCKS = tuple(
     )
 )
 _NUMBERS = (
-    FitVariable("rate", 2.0, 0.1, 50.0, 2.0),
-    FitVariable("level", 1.0, 0.1, 10.0, 1.0),
-    FitVariable("zero_1", 0.0, -1.0, 1.0, 0.02, 0.02),
-    FitVariable("gain_2", 0.0, -0.5, 0.5, 0.02, 0.02),
-    FitVariable("start of rise", 0.32, -1.0, 3.0, 0.05, 0.05),
-    FitVariable("start of fall", 1.15, -1.0, 3.0, 0.05, 0.05),
+    FitNumber("rate", 2.0, 0.1, 50.0, 2.0),
+    FitNumber("level", 1.0, 0.1, 10.0, 1.0),
+    FitNumber("zero_1", 0.0, -1.0, 1.0, 0.02, 0.02),
+    FitNumber("gain_2", 0.0, -0.5, 0.5, 0.02, 0.02),
+    FitNumber("start of rise", 0.32, -1.0, 3.0, 0.05, 0.05),
+    FitNumber("start of fall", 1.15, -1.0, 3.0, 0.05, 0.05),
 )
 
 
@@ -100,7 +100,7 @@ def test_a_model_whose_two_recordings_want_two_rates_holds_for_itself_only() -> 
 
 def test_numbers_that_act_only_as_their_product_are_not_identifiable() -> None:
     measured = 6.0 * _TIME + 0.01 * np.random.default_rng(1).normal(size=_COUNT)
-    numbers = (FitVariable("one", 2.0, 0.1, 10.0, 2.0), FitVariable("other", 3.0, 0.1, 10.0, 3.0))
+    numbers = (FitNumber("one", 2.0, 0.1, 10.0, 2.0), FitNumber("other", 3.0, 0.1, 10.0, 3.0))
 
     found = fit(
         lambda points: measured[:, None] - points[0] * points[1] * _TIME[:, None],
@@ -115,7 +115,7 @@ def test_numbers_that_act_only_as_their_product_are_not_identifiable() -> None:
 
 def test_the_tolerance_that_widens_an_interval_is_named_with_its_share_of_the_variance() -> None:
     measured = 2.0 + 0.001 * np.random.default_rng(1).normal(size=_COUNT)
-    numbers = (FitVariable("value", 1.0, 0.1, 10.0, 1.0), FitVariable("zero", 0.0, -1.0, 1.0, 0.1, 0.1))
+    numbers = (FitNumber("value", 1.0, 0.1, 10.0, 1.0), FitNumber("zero", 0.0, -1.0, 1.0, 0.1, 0.1))
 
     found = fit(
         lambda points: measured[:, None] - (points[0] + points[1]) * np.ones((_COUNT, 1)),
@@ -162,7 +162,7 @@ def test_a_sample_that_alone_decides_a_number_is_left_out() -> None:
 
     found = fit(
         lambda points: measured - slope * points[:1],
-        (FitVariable("value", 1.0, -10.0, 10.0, 1.0),),
+        (FitNumber("value", 1.0, -10.0, 10.0, 1.0),),
         [ResidualBlock("only", "first", slice(0, _COUNT))],
         memory=0,
         is_motion=True,
@@ -177,7 +177,7 @@ def test_residuals_that_are_too_smooth_for_noise_are_a_conflict() -> None:
 
     found = fit(
         lambda points: measured[:, None] - points[:1],
-        (FitVariable("level", 1.0, -10.0, 10.0, 1.0),),
+        (FitNumber("level", 1.0, -10.0, 10.0, 1.0),),
         [ResidualBlock("only", "first", slice(0, _COUNT))],
     )
 
@@ -187,7 +187,7 @@ def test_residuals_that_are_too_smooth_for_noise_are_a_conflict() -> None:
 
 
 def test_a_law_that_fits_exactly_leaves_numbers_and_a_channel_of_small_units_keeps_its_weight() -> None:
-    one = (FitVariable("level", 1.0, -10.0, 10.0, 1.0),)
+    one = (FitNumber("level", 1.0, -10.0, 10.0, 1.0),)
     exact = fit(lambda points: 2.0 - np.ones((50, 1)) * points[:1], one, [ResidualBlock("a", "first", slice(0, 50))])
     assert exact.values[0] == pytest.approx(2.0)
     measured = 2.0 + np.random.default_rng(1).normal(size=100)[:, None] * 0.1
@@ -204,7 +204,7 @@ def test_as_many_samples_as_numbers_are_refused() -> None:
     with pytest.raises(IdentificationError, match="1 samples cannot determine 1 parameters"):
         fit(
             lambda points: 2.5 - points[:1],
-            (FitVariable("a", 1.0, -9.0, 9.0, 1.0),),
+            (FitNumber("a", 1.0, -9.0, 9.0, 1.0),),
             [ResidualBlock("a", "first", slice(0, 1))],
         )
 
@@ -212,13 +212,13 @@ def test_as_many_samples_as_numbers_are_refused() -> None:
 @pytest.mark.parametrize(
     ("numbers", "blocks", "said"),
     [
-        ((FitVariable("rate", 2.0, 2.0, 2.0, 2.0),), _BLOCKS, "rate: bounds 2 to 2, start 2"),
-        ((FitVariable("rate", 9.0, 0.1, 5.0, 2.0),), _BLOCKS, "rate: bounds 0.1 to 5, start 9"),
+        ((FitNumber("rate", 2.0, 2.0, 2.0, 2.0),), _BLOCKS, "rate: bounds 2 to 2, start 2"),
+        ((FitNumber("rate", 9.0, 0.1, 5.0, 2.0),), _BLOCKS, "rate: bounds 0.1 to 5, start 9"),
     ],
     ids=["equal bounds", "start outside"],
 )
 def test_a_fit_that_cannot_begin_says_why(
-    numbers: tuple[FitVariable, ...], blocks: tuple[ResidualBlock, ...], said: str
+    numbers: tuple[FitNumber, ...], blocks: tuple[ResidualBlock, ...], said: str
 ) -> None:
     with pytest.raises(IdentificationError, match=said):
         fit(lambda points: np.zeros((_COUNT, points.shape[1])), numbers, blocks)
@@ -232,8 +232,8 @@ def test_an_interval_along_a_product_ends_where_the_prior_of_the_other_number_en
     """
     measured = 2.0 * np.ones((_COUNT, 1)) + 0.01 * np.random.default_rng(1).normal(size=(_COUNT, 1))
     numbers = (
-        FitVariable("size", 1.0, 0.01, 1000.0, 1.0),
-        FitVariable("exponent", 0.0, -9.0, 9.0, deviation, deviation),
+        FitNumber("size", 1.0, 0.01, 1000.0, 1.0),
+        FitNumber("exponent", 0.0, -9.0, 9.0, deviation, deviation),
     )
 
     found = fit(
@@ -278,14 +278,14 @@ def test_a_search_that_ends_where_no_run_succeeds_has_not_converged_and_names_th
         return np.where(side * points[0] > 1.0, np.nan, left)
 
     block = ResidualBlock("only", "first", slice(0, _COUNT))
-    offset = FitVariable("offset", 0.9, -5.0, 5.0, 1.0)
-    found = fit(residuals, (FitVariable("rate", 0.2 * side, -5.0, 5.0, 1.0), offset), (block,))
+    offset = FitNumber("offset", 0.9, -5.0, 5.0, 1.0)
+    found = fit(residuals, (FitNumber("rate", 0.2 * side, -5.0, 5.0, 1.0), offset), (block,))
     assert not found.has_converged
     assert found.edge == {"rate": side}
     assert 0.5 < side * found.by_name["rate"] <= 1.0
     # With a bound inside of the edge the search ends at that.
     low, high = sorted((-4.0 * side, 0.9 * side))
-    bounded = fit(residuals, (FitVariable("rate", 0.2 * side, low, high, 1.0), offset), (block,))
+    bounded = fit(residuals, (FitNumber("rate", 0.2 * side, low, high, 1.0), offset), (block,))
     assert bounded.has_converged
     assert not bounded.edge
     assert bounded.by_name["rate"] == pytest.approx(0.9 * side, rel=1e-6)
@@ -296,7 +296,7 @@ def test_a_number_beside_whose_start_no_run_succeeds_is_refused_by_name() -> Non
         line = _TIME[:, None] * points[0] + points[1]
         return np.asarray(np.where(points[1] == 1.0, line, np.nan))
 
-    numbers = (FitVariable("slope", 1.0, 0.0, 9.0, 1.0), FitVariable("level", 1.0, 0.0, 9.0, 1.0))
+    numbers = (FitNumber("slope", 1.0, 0.0, 9.0, 1.0), FitNumber("level", 1.0, 0.0, 9.0, 1.0))
     for is_motion in (False, True):
         with pytest.raises(IdentificationError, match=r"^level: every run fails near 1$"):
             fit(residuals, numbers, (ResidualBlock("line", "only", slice(0, _COUNT)),), is_motion=is_motion)

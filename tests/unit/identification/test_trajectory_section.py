@@ -212,7 +212,7 @@ def test_the_fit_starts_from_what_the_bench_found_and_keeps_the_rest_of_it(solve
     assert started is not None
     friction = next(one for one in started.numbers if one.path == "friction.static_torque")
     known = static["friction.static_torque"]
-    assert friction.free.start == pytest.approx(known.value, abs=5e-3 * known.wider_half_width)
+    assert friction.start == pytest.approx(known.value, abs=5e-3 * known.wider_half_width)
 
 
 def test_a_value_that_both_found_is_that_of_the_fit_in_the_new_set(solve: Solve) -> None:
@@ -232,7 +232,7 @@ def test_the_interval_of_the_bench_can_be_the_prior_of_the_fit(solve: Solve) -> 
     outcome = solve(STATIC + FIT + prior)
     assert outcome.trajectory is not None
     known = outcome.results[0]["friction.static_torque"]
-    given = next(one for one in outcome.trajectory.numbers if one.path == "friction.static_torque").free
+    given = next(one for one in outcome.trajectory.numbers if one.path == "friction.static_torque")
     assert given.start == known.value
     assert given.deviation == pytest.approx(known.half_width / 1.96, rel=1e-2)
     with pytest.raises(PpafoError, match="prior = 'bench' needs a value that a procedure of this problem identifies"):

@@ -31,9 +31,9 @@ from ppafo.identification.bench.law import (
     BenchLaw,
     BenchResult,
     PooledReadings,
-    ReportedNumber,
     Values,
     recordings_of,
+    reported,
     result_of,
     solve,
     sought,
@@ -48,7 +48,7 @@ from ppafo.identification.bench.readings import (
     meter_readings,
 )
 from ppafo.identification.fit import Fit
-from ppafo.identification.least_squares import FitVariable
+from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.source import RecordingSource, pool
 from ppafo.identification.tolerances import GAS_LAW as LIMIT_OF_GAS_LAW
 from ppafo.identification.tolerances import Tolerances
@@ -77,7 +77,8 @@ _LARGEST_COEFFICIENT = 1.0
 """Largest possible discharge coefficient [-]: the flow of a loss-free nozzle."""
 _GRAMS_PER_BAR = 1.0e8
 """Conversion factor from kg/(s Pa) to g/s per bar."""
-_GAP = ReportedNumber("open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of a gap beside it")
+_SIZE = FitNumber("size")
+_GAP = reported("open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of a gap beside it")
 Law = Literal["orifice", "iso6358", "laminar", "both"]
 
 VALVE = "name of a valve of the set; default: the chosen one"
@@ -192,7 +193,7 @@ def is_same_gas(molar_mass: float, other: float) -> bool:
     return abs(molar_mass / other - 1.0) < _SAME_GAS
 
 
-def gas_tolerances(gas: GasAt, tolerances: Tolerances) -> tuple[FitVariable, ...]:
+def gas_tolerances(gas: GasAt, tolerances: Tolerances) -> tuple[FitNumber, ...]:
     """Return the uncertain quantities of the gas: temperature [K] and relative departure from the ideal gas law [-]."""
     departure = LIMIT_OF_GAS_LAW if tolerances.gas_law is None else tolerances.gas_law
     return (*tolerance(TEMPERATURE, gas.temperature_deviation), *within(GAS_LAW, departure))
@@ -200,7 +201,7 @@ def gas_tolerances(gas: GasAt, tolerances: Tolerances) -> tuple[FitVariable, ...
 
 def flow_tolerances(
     gas: GasAt, tolerances: Tolerances, names: tuple[str, str], largest: float
-) -> tuple[FitVariable, ...]:
+) -> tuple[FitNumber, ...]:
     """Return the uncertain quantities of a flow bench: gas, gains and zeros; ``names`` are the pressure channels.
 
     ``largest`` is the largest reading of the flow meter [kg/s].
@@ -285,22 +286,46 @@ class OpeningSizes(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """Flow law of an opening: gas, law, and known quantities.
+    """Flow law of an opening: gas, law, known quantities, and the sizes as they are reported.
 
     For an orifice, ``known`` is the area [m^2] or discharge coefficient [-] that multiplies the unknown size; ISO 6358
-    does not use it. A ``critical_ratio`` [-] of None is estimated. The law ``both`` is a laminar gap in parallel with
-    ISO 6358 if the critical ratio is given, or else with an orifice.
+    does not use it. A ``critical_ratio`` [-] of None is estimated. The law ``both`` is a laminar ``gap`` in parallel
+    with ISO 6358 if the critical ratio is given, or else with an orifice.
     """
 
     gas: GasAt
     law: Law
     known: float = PRODUCT_ONLY
     critical_ratio: float | None = None
+    size: FitNumber = _SIZE
+    gap: FitNumber = _GAP
 
     @property
     def has_sought_ratio(self) -> bool:
         """True if the critical ratio b of ISO 6358 is estimated."""
         return self.law == "iso6358" and self.critical_ratio is None
+
+    @property
+    def ratio_path(self) -> str:
+        """Path of the critical ratio, in the section of the size."""
+        return f"{self.size.path.rpartition('.')[0]}.critical_ratio"
+
+    def sizes(self, at: Values) -> OpeningSizes:
+        """Return the sizes, given the values of the fit."""
+        return OpeningSizes(at[self.size.path], at[self.ratio_path], at[self.gap.path])
+
+    def unknowns(self, start: OpeningSizes, alone: OpeningSizes) -> tuple[FitNumber, ...]:
+        """Return the unknowns with start values.
+
+        Parallel parts have the magnitude of the sizes ``alone``, as if each carried the whole flow: either may be zero,
+        which is a valid result.
+        """
+        if self.law != "both":
+            ratio = reported(self.ratio_path, "", "Critical ratio b of ISO 6358")
+            of_ratio = (sought(ratio, start.critical_ratio, *CRITICAL_RATIOS[1:]),) if self.has_sought_ratio else ()
+            return (sought(self.size, start.size, 0.0), *of_ratio)
+        parts = (self.size, start.size, alone.size), (self.gap, start.beside, alone.beside)
+        return tuple(sought(replace(part, size=whole), first, 0.0, scale=whole) for part, first, whole in parts)
 
     def flow(self, sizes: OpeningSizes, first: Floats, second: Floats) -> Floats:
         """Return the mass flow [kg/s] for pressures [Pa], positive from first to second."""
@@ -333,55 +358,32 @@ class Opening:
         return OpeningSizes(size, ratio, *beside), OpeningSizes(float(alone[0]), ratio, *alone[1:].tolist())
 
 
-class Paths(NamedTuple):
-    """Names of the fit variables of an opening; an empty name for a quantity that is not estimated."""
+def size_of(
+    noun: str, section: str, law: Law, critical_ratio: float | None, of_set: FitNumber | None = None
+) -> FitNumber:
+    """Return the size of an opening as it is reported, ``of_set`` for an orifice of which the set knows a factor.
 
-    size: str
-    critical_ratio: str = ""
-    beside: str = ""
-
-    def sizes(self, at: Values) -> OpeningSizes:
-        """Return the sizes of the opening, given the values of the fit variables."""
-        return OpeningSizes(at[self.size], at[self.critical_ratio], at[self.beside])
-
-    def sought(self, start: OpeningSizes, alone: OpeningSizes) -> tuple[FitVariable, ...]:
-        """Return the unknowns with start values; parallel parts are scaled as if each carried all of the flow."""
-        scale = alone.size if self.beside else 0.0
-        return (
-            sought(self.size, start.size, 0.0, scale=scale),
-            *(sought(name, start.critical_ratio, *CRITICAL_RATIOS[1:]) for name in (self.critical_ratio,) if name),
-            *((sought(self.beside, start.beside, 0.0, scale=alone.beside),) if self.beside else ()),
-        )
-
-
-def reported_parts(
-    opening: Opening, size: ReportedNumber, gap: ReportedNumber, alone: OpeningSizes
-) -> tuple[list[ReportedNumber], Paths]:
-    """Return the reported sizes of an opening, with its gap or its sought critical ratio, and their names in the fit.
-
-    The critical ratio has its path in the section of ``size``. The magnitudes of parallel parts are the sizes
-    ``alone``, as if each part carried the whole flow: either part may be zero, which is a valid result.
+    ``section`` is that of the opening in a set; a size that a set has not is of the ``noun``.
     """
-    if opening.has_sought_ratio:
-        section = size.path.rpartition(".")[0]
-        ratio = ReportedNumber(f"{section}.critical_ratio", "", "Critical ratio b of ISO 6358")
-        return [size, ratio], Paths(size.path, ratio.path)
-    if opening.law != "both":
-        return [size], Paths(size.path)
-    return [replace(size, size=alone.size), replace(gap, size=alone.beside)], Paths(size.path, beside=gap.path)
+    own = {"open valve": "open_valve_flow", "leak": "vane_leak"}[noun]
+    if law == "laminar":
+        return reported(f"{own}.laminar_coefficient", "kg/(s Pa^2)", f"Laminar coefficient of the {noun}")
+    if law == "iso6358" or critical_ratio is not None:
+        known = "" if critical_ratio is None else f" with the set's b = {critical_ratio:g}"
+        return reported(f"{section}.sonic_conductance", "m^3/(s Pa)", f"Sonic conductance C of the {noun}{known}")
+    return of_set or reported(f"{own}.effective_area", "m^2", f"Effective area Cd A of the {noun}")
 
 
-def shown_flow(opening: Opening, paths: Paths, pressures: Mapping[str, Floats], at: Values) -> Floats:
+def shown_flow(opening: Opening, pressures: Mapping[str, Floats], at: Values) -> Floats:
     """Return the flow meter reading [kg/s] through an opening at two shown pressures [Pa], by channel."""
     first, second = (true_pressure(at, name, shown) for name, shown in pressures.items())
-    sizes = paths.sizes(at)
+    sizes = opening.sizes(at)
     sizes = sizes._replace(beside=sizes.beside + at[APPARENT])
     return read_flow(at, opening.gas, opening.flow(sizes, first, second))
 
 
 def solve_flow(
     opening: Opening,
-    paths: Paths,
     pressures: Mapping[str, Floats],
     readings: PooledReadings,
     tolerances: Tolerances,
@@ -397,12 +399,12 @@ def solve_flow(
     flow = readings.measured
     start, alone = opening.rough_sizes(shown_first, shown_second, flow, ratios)
     numbers = (
-        *paths.sought(start, alone),
+        *opening.unknowns(start, alone),
         *flow_tolerances(opening.gas, tolerances, (first_name, second_name), float(np.abs(flow).max())),
         # A gain that differs between small and large flows bends the curve of one opening as a gap beside it does.
         *(within(APPARENT, tolerances.gain_of("mass_flow") * alone.beside) if opening.law == "both" else ()),
     )
-    return solve(partial(shown_flow, opening, paths, pressures), readings, numbers, confidence)
+    return solve(partial(shown_flow, opening, pressures), readings, numbers, confidence)
 
 
 class OpenValveFlowProblem(FlowLaw):
@@ -463,15 +465,16 @@ class OpenValveFlowProblem(FlowLaw):
         if self.law == "iso6358":
             check_both_regimes(ratio, sources[0])
         # In parallel with a laminar gap, b selects ISO 6358; the law ``iso6358`` estimates b.
-        opening = Opening(gas, self.law, area or PRODUCT_ONLY, critical_ratio if self.law == "both" else None)
-        _, alone = opening.rough_sizes(upstream, downstream, flow)
-        reported, paths = reported_parts(opening, _size(opening, area, path), _GAP, alone)
+        known_ratio = critical_ratio if self.law == "both" else None
+        text = f"Discharge coefficient with the set's area of {1e6 * (area or 0.0):.4g} mm^2; only Cd A is identified"
+        coefficient = reported(f"{path}.discharge_coefficient", "", text) if area else None
+        size = size_of("open valve", path, self.law, known_ratio, coefficient)
+        opening = Opening(gas, self.law, area or PRODUCT_ONLY, known_ratio, size, _GAP)
         # The nearer the pressures are to each other, the more their noise affects the computed flow.
         limits = critical_pressure_ratio(gas.heat_capacity_ratio), _NEARLY_EQUAL
         regimes = [_REGIMES[regime] for regime in np.digitize(ratio, limits).tolist()]
         fitted, model = solve_flow(
             opening,
-            paths,
             {"upstream_pressure": upstream, "downstream_pressure": downstream},
             PooledReadings(flow, regimes, np.array(recordings_of(sources))[used].tolist()),
             context.tolerances,
@@ -483,39 +486,26 @@ class OpenValveFlowProblem(FlowLaw):
         dense, order = np.linspace(ratio.min(), ratio.max(), 200), np.argsort(ratio)
         first = np.interp(dense, ratio[order], upstream[order])
         shown = {"upstream_pressure": first, "downstream_pressure": dense * first}
-        law_flow = shown_flow(opening, paths, shown, defaultdict(float, fitted.by_name))
+        law_flow = shown_flow(opening, shown, defaultdict(float, fitted.by_name))
         curve = curve_mark(LAW_NAMES[self.law], dense, _GRAMS_PER_BAR * law_flow / first)
         marks = readings_mark("measured", ratio, measured_ordinate), curve
         axes = Kind("Pressure ratio"), Kind("Flow over upstream pressure", "g/s per bar")
         result = result_of(
             sources,
             fitted,
-            reported,
             f"{flow.size} readings at pressure ratios from {ratio.min():.2f} to {ratio.max():.2f}; "
             f"scatter {scatter:.2%} of the largest flow",
             with_residuals("Open-valve flow", *axes, marks, ratio, measured_ordinate - fitted_ordinate),
             remarks=(*remarks, *meter_remarks),
             scatter=scatter,
         )
-        coefficient, *others = result.estimates
+        found, *others = result.estimates
         # Other sizes than a discharge coefficient have a unit.
-        if area is None or coefficient.unit or coefficient.low <= _LARGEST_COEFFICIENT:
+        if area is None or found.unit or found.low <= _LARGEST_COEFFICIENT:
             return result
         doubt = (
-            f"Cd = {coefficient.value:.3g} is impossible, above 1: mass_flow or a pressure has a wrong unit, or the "
+            f"Cd = {found.value:.3g} is impossible, above 1: mass_flow or a pressure has a wrong unit, or the "
             f"valve is larger than the set's {area * 1e6:.4g} mm^2"
         )
-        doubted = replace(coefficient, verdict="holds for this model only")
+        doubted = replace(found, verdict="holds for this model only")
         return replace(result, estimates=(doubted, *others), remarks=(doubt, *result.remarks))
-
-
-def _size(opening: Opening, area: float | None, path: str) -> ReportedNumber:
-    """Return the reported size of the opening: path in a set, unit and description."""
-    if opening.law == "laminar":
-        return replace(_GAP, text="Laminar coefficient of the open valve")
-    if opening.law == "iso6358" or opening.critical_ratio is not None:
-        return ReportedNumber(f"{path}.sonic_conductance", "m^3/(s Pa)", "Sonic conductance C of ISO 6358")
-    if area:
-        text = f"Discharge coefficient with the set's area of {area * 1e6:.4g} mm^2; only Cd A is identified"
-        return ReportedNumber(f"{path}.discharge_coefficient", "", text)
-    return ReportedNumber("open_valve_flow.effective_area", "m^2", "Effective area Cd A")

@@ -22,10 +22,10 @@ from ppafo.documents.models import Quantified
 from ppafo.identification.bench.law import (
     BenchContext,
     BenchResult,
-    ReportedNumber,
     TimedLaw,
     Values,
     halved_readings,
+    reported,
     result_of,
     solve,
     sought,
@@ -33,7 +33,7 @@ from ppafo.identification.bench.law import (
     within,
 )
 from ppafo.identification.bench.readings import check_moves, check_no_gap, check_sources, without_wrong_samples
-from ppafo.identification.least_squares import FitVariable
+from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.source import RecordingSource, window
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
@@ -87,12 +87,12 @@ _LEAST_SPEED, _LEAST_SWEPT = 1.0e-6, 1.0e-9
 _MOVING = 0.03
 """Fraction of the largest speed [-] below which the damping panel omits the noisy acceleration."""
 _OF_THE_DEVICE = (
-    ReportedNumber("friction.viscous_damping", "N m s/rad", "Viscous damping"),
-    ReportedNumber("friction.dynamic_torque", "N m", "Dynamic friction"),
+    reported("friction.viscous_damping", "N m s/rad", "Viscous damping"),
+    reported("friction.dynamic_torque", "N m", "Dynamic friction"),
 )
 _OVER_INERTIA = (
-    ReportedNumber("free_decay.damping_over_inertia", "1/s", "Viscous damping over the inertia"),
-    ReportedNumber("free_decay.friction_over_inertia", "rad/s^2", "Dynamic friction over the inertia"),
+    reported("free_decay.damping_over_inertia", "1/s", "Viscous damping over the inertia"),
+    reported("free_decay.friction_over_inertia", "rad/s^2", "Dynamic friction over the inertia"),
 )
 
 
@@ -288,10 +288,10 @@ class FreeDecayProblem(TimedLaw):
         check_sources(sources, (ANGLE,), MINIMUM_SAMPLES)
         sources, remarks = without_wrong_samples(sources, (ANGLE, VELOCITY), self.start, self.end)
         decays = tuple(decay_of(source, self.start, self.end) for source in sources)
-        damping, friction = _OF_THE_DEVICE if inertia else _OVER_INERTIA
-        paths, assumed_inertia = (damping.path, friction.path), inertia or _UNIT_INERTIA
-        numbers = (
-            *_unknowns(decays, paths, assumed_inertia, rise),
+        numbers = _OF_THE_DEVICE if inertia else _OVER_INERTIA
+        assumed_inertia = inertia or _UNIT_INERTIA
+        variables = (
+            *_unknowns(decays, numbers, assumed_inertia, rise),
             *tolerance(_INERTIA, inertia_deviation / assumed_inertia),
             *within(_GAIN, context.tolerances.gain_of(ANGLE)),
         )
@@ -305,7 +305,7 @@ class FreeDecayProblem(TimedLaw):
         readings = halved_readings(sources, parts, ("the first half of the travel", "the second half of the travel"))
 
         def slowing_of(at: Values, inertia: float) -> Slowing:
-            damping_rate, deceleration = (max(at[path], 0.0) / inertia for path in paths)
+            damping_rate, deceleration = (max(at[number.path], 0.0) / inertia for number in numbers)
             return Slowing(damping_rate, deceleration, math.expm1(at.get(_RISE, 0.0)), at.get(_RISE_VELOCITY, 0.0))
 
         def law(at: Values) -> Floats:
@@ -317,7 +317,7 @@ class FreeDecayProblem(TimedLaw):
                     series.append(decay.sign * speed)
             return np.concatenate(series)
 
-        fit, model = solve(law, readings, numbers, self.confidence)
+        fit, model = solve(law, readings, variables, self.confidence)
         slowing = slowing_of(fit.by_name, assumed_inertia)
         at_rest = sum(
             float(decay.time[-1]) > course_to_standstill(fit.by_name[_START_SPEED.format(number)], slowing).time[-1]
@@ -329,7 +329,6 @@ class FreeDecayProblem(TimedLaw):
         return result_of(
             sources,
             fit,
-            (damping, friction),
             f"{count_of(len(decays), 'decay')} ({used} of {recorded}), {at_rest} to standstill; beta/I = "
             f"{slowing.damping_rate:.4g} 1/s, T_c/I = {slowing.deceleration:.4g} rad/s^2{unknown}",
             _panels(decays, model, slowing),
@@ -338,14 +337,14 @@ class FreeDecayProblem(TimedLaw):
 
 
 def _unknowns(
-    decays: tuple[FreeDecay, ...], paths: tuple[str, str], inertia: float, rise: float
-) -> tuple[FitVariable, ...]:
+    decays: tuple[FreeDecay, ...], numbers: tuple[FitNumber, FitNumber], inertia: float, rise: float
+) -> tuple[FitNumber, ...]:
     """Return damping, friction, initial angle and speed of each decay, and the rise of the friction near standstill.
 
     With w_0 the initial speed and s the swept angle, viscous damping alone has the rate w_0 / s, and Coulomb friction
     alone the deceleration w_0^2 / (2 s); the search starts from half of each.
     """
-    initial, rates = list[FitVariable](), []
+    initial, rates = list[FitNumber](), []
     for number, decay in enumerate(decays, start=1):
         velocity, _ = smoothed_rates(decay.time, decay.angle)
         speed = max(float(np.abs(velocity[:FEWEST_SMOOTHED]).max()), _LEAST_SPEED)
@@ -358,12 +357,12 @@ def _unknowns(
     # The prior of ln(1 + q) is uniform up to ``rise``: its standard deviation is its width over sqrt(12).
     most, usual = math.log1p(rise), _USUAL_RISE_VELOCITY
     near_rest = (
-        FitVariable(_RISE, 0.5 * most, 0.0, 2.0 * most, most, most / math.sqrt(12.0)),
-        FitVariable(_RISE_VELOCITY, usual, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY, usual, usual),
+        FitNumber(_RISE, 0.5 * most, 0.0, 2.0 * most, most, most / math.sqrt(12.0)),
+        FitNumber(_RISE_VELOCITY, usual, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY, usual, usual),
     )
     return (
-        sought(paths[0], inertia * damping_rate, 0.0),
-        sought(paths[1], inertia * deceleration, 0.0),
+        sought(numbers[0], inertia * damping_rate, 0.0),
+        sought(numbers[1], inertia * deceleration, 0.0),
         *initial,
         *(near_rest if most > 0.0 else ()),
     )

@@ -12,9 +12,9 @@ from pydantic import Field
 
 from ppafo.documents.models import Quantified, StrictTable, Text
 from ppafo.errors import IdentificationError
-from ppafo.identification.estimate import UNKNOWN, Estimate, Verdict, relative_half_width
-from ppafo.identification.fit import Fit, conflict_in_words, fit, widened_by, wrong_shape
-from ppafo.identification.least_squares import FitVariable, ResidualBlock
+from ppafo.identification.estimate import Estimate
+from ppafo.identification.fit import Fit, conflict_in_words, estimate_of, fit, wrong_shape
+from ppafo.identification.least_squares import FitNumber, ResidualBlock
 from ppafo.identification.new_set import stated_half_width
 from ppafo.identification.noise import SAMPLES_PER_COEFFICIENT
 from ppafo.identification.source import RecordingSource, kind_of, remarks_on_readings
@@ -30,10 +30,6 @@ from ppafo.wording import said_missing
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_AT_BOUND = 1.0e-6
-"""Relative distance from a bound [-] up to which an estimate counts as at its bound."""
-_NONE = 0.1
-"""Upper end of an interval that begins at zero [typical magnitudes], below which the part is none."""
 _SIZE = (3.1, 2.7)
 """Width and height of a panel [in] for two panels side by side in a journal column."""
 Values = Mapping[str, float]
@@ -139,69 +135,28 @@ class TimedLaw(BenchLaw):
     end: Annotated[float, Quantified("s")] | None = Field(None, description="last time to use, such as '8 s'")
 
 
-@dataclass(frozen=True, slots=True)
-class ReportedNumber:
-    """Estimated quantity to report: path (its name in the fit), SI unit, and description as a sentence.
-
-    ``size`` is a typical magnitude [unit] of a quantity that may be zero: an estimate of zero is then a valid result
-    and not the bound of the search.
-    """
-
-    path: str
-    unit: str
-    text: str
-    size: float | None = None
-
-
 def result_of(
     sources: tuple[RecordingSource, ...],
     fitted: Fit,
-    reported: Sequence[ReportedNumber],
     summary: str,
     panels: tuple[Panel, ...],
     reason: str = "",
     remarks: tuple[str, ...] = (),
     scatter: float = math.nan,
 ) -> BenchResult:
-    """Return the result of a procedure: an estimate for each reported quantity, and remarks on the recordings.
+    """Return the result of a procedure: an estimate for each number with a text, and remarks on the recordings.
 
     ``reason`` says more of a conflict, if readings contradict the others; ``scatter`` is the field of the result.
     """
-    origin = tuple(source.trace for source in sources)
-    estimates = list[Estimate]()
-    for item in reported:
-        index = [*fitted.by_name].index(item.path)
-        value, low, high = (float(column[index]) for column in (fitted.values, fitted.low, fitted.high))
-        number = fitted.numbers[index]
-        width = relative_half_width(value, low, high, item.size)
-        bound = next((end for end in (number.low, number.high) if abs(value - end) <= _AT_BOUND * number.scale), None)
-        # Not 1e-17 where 0 is meant.
-        value = value if bound is None else bound
-        # A part whose interval begins at its bound of zero cannot be distinguished from no part.
-        is_part = item.size is not None and number.low == 0.0 >= low
-        if is_part and high < _NONE * (item.size or 0.0):
-            value = bound = 0.0
-        verdict: Verdict = "identified"
-        sentence = f"{item.text}; {widened_by(fitted, item.path)}."
-        if bound == 0.0 and item.size is not None and width < UNKNOWN:
-            sentence = f"{item.text}: none; {widened_by(fitted, item.path)}."
-            verdict = "identified" if fitted.conflict is None else "holds for this model only"
-        elif bound is not None:
-            verdict = "at its bound"
-            sentence = f"{sentence} The readings favour a value at or beyond {value:.4g}; the interval ends there."
-        elif width >= UNKNOWN or is_part:
-            verdict, sentence = "not identifiable", f"{sentence} The interval includes zero or twice the value."
-        elif fitted.conflict is not None:
-            verdict = "holds for this model only"
-        path, unit, size = item.path, item.unit, item.size
-        estimates.append(Estimate(path, value, unit, low, high, verdict, sentence, origin, fitted.confidence, size))
+    origin, conflict = [source.trace for source in sources], conflict_in_words(fitted, reason)
+    rows = [row for row, number in enumerate(fitted.numbers) if number.text]
     return BenchResult(
         procedure=sources[0].user,
         summary=summary,
-        estimates=tuple(estimates),
+        estimates=tuple(estimate_of(fitted, row, origin, conflict) for row in rows),
         panels=panels,
         kind=kind_of(source.recording.kind for source in sources),
-        conflict=conflict_in_words(fitted, reason),
+        conflict=conflict,
         remarks=(*remarks, *remarks_on_readings(sources)),
         scatter=scatter,
     )
@@ -227,7 +182,7 @@ def figure_3(torque: BenchResult, decay: BenchResult) -> "Figure":
     return bench_figure(panels, kind_of((torque.kind, decay.kind)))
 
 
-def tolerance(name: str, deviation: float, start: float = 0.0, family: str = "") -> tuple[FitVariable, ...]:
+def tolerance(name: str, deviation: float, start: float = 0.0, family: str = "") -> tuple[FitNumber, ...]:
     """Return a variable with a prior of standard deviation ``deviation`` about ``start`` [SI]; nothing if exact.
 
     Variables of one ``family`` are tested together.
@@ -237,17 +192,25 @@ def tolerance(name: str, deviation: float, start: float = 0.0, family: str = "")
     # The scale of the search is the limit, so that a step of one scale is a likely one.
     limit = math.sqrt(3.0) * deviation
     width = _WIDEST * limit
-    return (FitVariable(name, start, start - width, start + width, limit, deviation, family),)
+    return (FitNumber(name, start, start - width, start + width, limit, deviation, family=family),)
 
 
-def within(name: str, limit: float, family: str = "") -> tuple[FitVariable, ...]:
+def within(name: str, limit: float, family: str = "") -> tuple[FitNumber, ...]:
     """Return an error of the bench within +-``limit`` [SI], as a variable with a prior; nothing if exact."""
     return tolerance(name, deviation_of_limit(limit), family=family)
 
 
-def sought(name: str, start: float, low: float = -math.inf, high: float = math.inf, scale: float = 0.0) -> FitVariable:
-    """Return an unknown without a prior [SI]; the default scale is the magnitude of its start."""
-    return FitVariable(name, start, low, high, scale or abs(start) or 1.0)
+def sought(
+    number: FitNumber | str, start: float, low: float = -math.inf, high: float = math.inf, scale: float = 0.0
+) -> FitNumber:
+    """Return an unknown without a prior [SI], by path or as it is reported; the default scale is that of its start."""
+    number = FitNumber(number) if isinstance(number, str) else number
+    return replace(number, start=start, low=low, high=high, scale=scale or abs(start) or 1.0)
+
+
+def reported(path: str, unit: str, text: str, size: float | None = None) -> FitNumber:
+    """Return a quantity to report: path in a set, SI unit, description, and typical magnitude if it may be zero."""
+    return FitNumber(path, unit=unit, text=text, size=size)
 
 
 @dataclass(frozen=True, slots=True)
@@ -293,7 +256,7 @@ def halved_readings(
 
 
 def solve(
-    law: Callable[[Values], Floats], readings: PooledReadings, numbers: Sequence[FitVariable], confidence: float
+    law: Callable[[Values], Floats], readings: PooledReadings, numbers: Sequence[FitNumber], confidence: float
 ) -> tuple[Fit, Floats]:
     """Fit a law to readings. Returns the fit, and the fitted values in the unit of the readings.
 

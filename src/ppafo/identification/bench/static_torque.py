@@ -24,9 +24,9 @@ from ppafo.identification.bench.law import (
     BenchLaw,
     BenchResult,
     PooledReadings,
-    ReportedNumber,
     Values,
     recordings_of,
+    reported,
     result_of,
     solve,
     sought,
@@ -250,10 +250,26 @@ class StaticTorqueProblem(BenchLaw):
         zeros = [f"{_SENSOR_ZERO} of {file}" for file in files] if has_zeros else [_SENSOR_ZERO]
         load_gain = f"gain of the {channel} sensor"
         numbers = (
-            sought(slope_path, start_slope),
-            sought(friction_path, start_friction, scale=scale),
-            sought(growth_path, 0.0, scale=scale / float(np.abs(readings.pressure).max())),
-            sought(_ZERO, start_zero, scale=scale),
+            sought(
+                reported(slope_path, slope_unit, f"{slope.capitalize()}, the common slope of both branches"),
+                start_slope,
+            ),
+            sought(
+                reported(friction_path, load_unit, f"{friction.capitalize()} without a pressure difference"),
+                start_friction,
+                scale=scale,
+            ),
+            sought(
+                reported(growth_path, f"{load_unit}/Pa", f"Growth of the {friction} with the pressure difference"),
+                0.0,
+                scale=scale / float(np.abs(readings.pressure).max()),
+            ),
+            # A zero of the scale may be an answer.
+            sought(
+                reported(_ZERO, load_unit, f"Zero of the {channel} sensor", float(np.ptp(readings.load))),
+                start_zero,
+                scale=scale,
+            ),
             *(number for name in zeros for number in within(name, tolerances.zero_of_pressure)),
             *within(_GAIN, tolerances.gain_of("pressure")),
             *within(load_gain, tolerances.gain_of(channel)),
@@ -299,15 +315,6 @@ class StaticTorqueProblem(BenchLaw):
         result = result_of(
             sources,
             fitted,
-            (
-                ReportedNumber(slope_path, slope_unit, f"{slope.capitalize()}, the common slope of both branches"),
-                ReportedNumber(friction_path, load_unit, f"{friction.capitalize()} without a pressure difference"),
-                ReportedNumber(
-                    growth_path, f"{load_unit}/Pa", f"Growth of the {friction} with the pressure difference"
-                ),
-                # A zero of the scale may be an answer.
-                ReportedNumber(_ZERO, load_unit, f"Zero of the {channel} sensor", float(np.ptp(readings.load))),
-            ),
             f"{readings.pressure.size} readings, {count_of(readings.repetitions, 'repetition')}; {slope} "
             f"{shown_slope:.4g} {shown_slope_unit}, {friction} {shown_friction:.3g} {unit}; "
             f"scatter {scatter:.3g} {unit}",

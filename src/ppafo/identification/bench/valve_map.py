@@ -34,9 +34,9 @@ from ppafo.identification.bench.law import (
     BenchContext,
     BenchResult,
     PooledReadings,
-    ReportedNumber,
     Values,
     recordings_of,
+    reported,
     result_of,
     solve,
     sought,
@@ -44,7 +44,7 @@ from ppafo.identification.bench.law import (
 from ppafo.identification.bench.readings import check_no_wrong_reading, check_sources, meter_readings
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.fit import SHAPE, Conflict
-from ppafo.identification.least_squares import FitVariable, Flags
+from ppafo.identification.least_squares import FitNumber, Flags
 from ppafo.identification.source import RecordingSource, pool
 from ppafo.model.effects.kind import SECTION
 from ppafo.model.effects.opening import NODES
@@ -71,6 +71,7 @@ _FULL = "valve_map.full_area"
 _NEARLY_FULL = 0.95
 """Least highest command [-] from which the area at full command is found."""
 _GAIN, _PLAY, _SATURATION = "valve_map.gain", "valve_map.hysteresis", "valve_map.saturation_command"
+_HYSTERESIS = reported(_PLAY, "", "Hysteresis: width between rising and falling command", _SMALL_COMMAND)
 _ROUND, _ROUNDS = "valve_map.round_off", (0.05, 0.005, 0.5)
 """Range over which corners of the opening are rounded, tried beside sharp ones: name, start and bounds [-]."""
 _BETTER = 5.4
@@ -161,7 +162,8 @@ class ValveMapProblem(FlowLaw):
         openings = [f"{SECTION}.opening.opening_{number:02}" for number in range(1, len(self.nodes) + 1)]
         numbers = (
             *self._unknowns(sources[0].where, np.abs(command), np.abs(sweep.areas), band, openings),
-            *((sought(_PLAY, 0.02, 0.0, 0.5, 0.1),) if is_two_way else ()),
+            # There is no backlash in commands of one direction.
+            *((sought(_HYSTERESIS, 0.02, 0.0, 0.5, 0.1),) if is_two_way else ()),
             *flow_tolerances(gas, context.tolerances, PRESSURES, float(np.abs(measured).max())),
         )
 
@@ -201,26 +203,9 @@ class ValveMapProblem(FlowLaw):
         scatter = np.std(residuals) / np.abs(measured).max()
         no_play = "the command was swept in one direction only: the dead band includes half the width of any hysteresis"
         if self.nodes:
-            reported = [ReportedNumber(_FULL, "m^2", "Effective area Cd A at full command")]
-            reported += [
-                ReportedNumber(name, "", f"Opening at a command of {node:g}", 1.0)
-                for name, node in zip(openings, self.nodes, strict=True)
-            ]
             found = f"a table of {len(self.nodes)} nodes, {1e6 * values[_FULL]:.4g} mm^2 at full command"
         else:
-            reported = [
-                ReportedNumber(
-                    band, "", "Dead band: command below which no gas flows, in both directions", _SMALL_COMMAND
-                ),
-                ReportedNumber(_GAIN, "m^2", "Effective area Cd A per command beyond the dead band"),
-            ]
             found = f"dead band {values[band]:.3g}, {1e6 * values[_GAIN]:.4g} mm^2 per command"
-        # Near the highest command there is no saturation to be seen, and no backlash in commands of one direction.
-        if not self.nodes and values[_SATURATION] < highest - _SATURATES:
-            reported.append(ReportedNumber(_SATURATION, "", "Saturation: command beyond which the opening is constant"))
-        if is_two_way:
-            width = "Hysteresis: width between rising and falling command"
-            reported.append(ReportedNumber(_PLAY, "", width, _SMALL_COMMAND))
         marks = []
         for role, name, on in (("rising", "fitted", branch == 1.0), ("falling", "", branch == -1.0)):
             if on.any():
@@ -230,21 +215,22 @@ class ValveMapProblem(FlowLaw):
         result = result_of(
             sources,
             fitted,
-            reported,
             f"{command.size} readings; {found}; scatter {scatter:.2%} of the largest flow",
             with_residuals("Valve map", *axes, marks, command, residuals),
             reason,
             (*sweep.remarks, *(() if is_two_way or self.nodes else (no_play,))),
         )
         if not self.nodes:
-            return result
+            # Near the highest command there is no saturation to be seen.
+            seen = [item for item in result.estimates if item.path != _SATURATION or item.value < highest - _SATURATES]
+            return replace(result, estimates=tuple(seen))
         result = _with_nodes(result, band, self.nodes, openings)
         remark = _of_full_opening(path, result.estimates[0], context, gas)
         return replace(result, remarks=(*result.remarks, *filter(None, [remark])))
 
     def _unknowns(
         self, where: str, size: Floats, areas: Floats, band: str, openings: Sequence[str]
-    ) -> tuple[FitVariable, ...]:
+    ) -> tuple[FitNumber, ...]:
         """Return the unknowns of the opening with first guesses from sizes of commands [-] and areas [m^2].
 
         ``band`` and ``openings`` are paths of the straight line or the table. Raises IdentificationError, beginning
@@ -262,19 +248,26 @@ class ValveMapProblem(FlowLaw):
                     f"{NODES}, with {_FEWEST_BETWEEN} readings or more between two of them and the ends 0 and 1"
                 )
             near = [float(np.median(areas[np.argsort(np.abs(size - node))[:3]])) for node in self.nodes]
-            starts = zip(openings, np.clip(np.array(near) / largest, 0.0, 1.0).tolist(), strict=True)
-            return (sought(_FULL, largest, 0.0), *(sought(name, start, 0.0, 1.0, 1.0) for name, start in starts))
+            starts = np.clip(np.array(near) / largest, 0.0, 1.0).tolist()
+            full = reported(_FULL, "m^2", "Effective area Cd A at full command")
+            return sought(full, largest, 0.0), *(
+                sought(reported(name, "", f"Opening at a command of {node:g}", 1.0), start, 0.0, 1.0, 1.0)
+                for name, node, start in zip(openings, self.nodes, starts, strict=True)
+            )
         half = float(size[areas > _HALF_OPEN * largest].min())
         if not half > 0.0:
             raise IdentificationError(f"{where}: at command 0, the valve has more than half of its largest flow")
         shut = size[areas < _SHUT * largest]
         # Inside the bounds, so that the search can go either way.
         start = float(np.clip(np.median(shut) if shut.size else 0.0, 0.01 * half, 0.9 * half))
+        shut_below = "Dead band: command below which no gas flows, in both directions"
+        gain = reported(_GAIN, "m^2", "Effective area Cd A per command beyond the dead band")
+        saturation = reported(_SATURATION, "", "Saturation: command beyond which the opening is constant")
         return (
-            sought(band, start, 0.0, half, highest),
-            sought(_GAIN, 0.5 * largest / (half - start), 0.0),
+            sought(reported(band, "", shut_below, _SMALL_COMMAND), start, 0.0, half, highest),
+            sought(gain, 0.5 * largest / (half - start), 0.0),
             # Just inside the highest command, beyond which no reading changes with it.
-            sought(_SATURATION, 0.02 * half + 0.98 * highest, half, highest * (1.0 + 1e-9), highest),
+            sought(saturation, 0.02 * half + 0.98 * highest, half, highest * (1.0 + 1e-9), highest),
         )
 
 

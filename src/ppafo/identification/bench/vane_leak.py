@@ -32,23 +32,22 @@ from ppafo.identification.bench.flow import (
     Law,
     Opening,
     OpeningSizes,
-    Paths,
     check_both_regimes,
     gas_tolerances,
     has_both_regimes,
     is_same_gas,
-    reported_parts,
+    size_of,
     solve_flow,
 )
 from ppafo.identification.bench.law import (
     BenchContext,
     BenchResult,
     PooledReadings,
-    ReportedNumber,
     TimedLaw,
     Values,
     halved_readings,
     recordings_of,
+    reported,
     result_of,
     solve,
     sought,
@@ -66,7 +65,7 @@ from ppafo.identification.bench.readings import (
 )
 from ppafo.identification.estimate import in_shown_unit, interval_texts
 from ppafo.identification.fit import Fit
-from ppafo.identification.least_squares import FitVariable
+from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.source import RecordingSource, pool, window
 from ppafo.identification.tolerances import Tolerances
 from ppafo.parameters.device import VANE
@@ -110,15 +109,13 @@ _FEWEST_STEADY = 8
 """Least number of readings of steady flow."""
 GAP = "effects.laminar_leak.coefficient"
 """Path of the coefficient of a laminar gap beside the orifice in a set."""
-_GAP = ReportedNumber(GAP, "kg/(s Pa^2)", "Laminar coefficient of a gap beside the orifice")
+_GAP = reported(GAP, "kg/(s Pa^2)", "Laminar coefficient of a gap beside the orifice")
 _TRIAL_RATIOS = tuple(np.linspace(*CRITICAL_RATIOS[1:], 20).tolist())
 """Critical ratios [-], the best of which starts the search for steady flow.
 
 From the usual one, a search may end at a wrong minimum, with zeros of the sensors for the bend of the curve."""
 _SHARP = 0.6
 """Discharge coefficient of a sharp-edged hole [-]."""
-_Laws = Sequence[tuple[Opening, ReportedNumber]]
-"""Chosen law and its rival, if it has one, each with its reported size."""
 _NEITHER = "neither ISO 6358 nor an orifice beside a laminar gap explains the readings"
 # Closed chambers.
 
@@ -264,12 +261,11 @@ def pressures_of_fall(
 class LawFit(NamedTuple):
     """Fit of a flow law to the readings of a leak.
 
-    ``opening`` is the law, ``reported`` are its quantities, ``fitted`` is the fit and ``model`` the fitted readings
-    [unit of the readings]. ``has_both_regimes`` is True for readings with choked and subsonic flow.
+    ``opening`` is the law, ``fitted`` is the fit and ``model`` the fitted readings [unit of the readings].
+    ``has_both_regimes`` is True for readings with choked and subsonic flow.
     """
 
     opening: Opening
-    reported: list[ReportedNumber]
     fitted: Fit
     model: Floats
     has_both_regimes: bool
@@ -279,24 +275,22 @@ class LawFit(NamedTuple):
         """True if no readings contradict the law and they determine the critical ratio, if it is sought."""
         if not self.opening.has_sought_ratio:
             return self.fitted.conflict is None
-        ratio, (_, low, high) = self.fitted.by_name[self.reported[-1].path], CRITICAL_RATIOS
+        ratio, (_, low, high) = self.fitted.by_name[self.opening.ratio_path], CRITICAL_RATIOS
         return self.fitted.conflict is None and self.has_both_regimes and low + _AT_BOUND < ratio < high - _AT_BOUND
 
     @property
     def has_gap(self) -> bool:
         """True for a laminar gap whose interval does not begin at zero."""
-        row = [number.name for number in self.fitted.numbers].index(self.reported[-1].path)
-        return self.opening.law == "both" and float(self.fitted.low[row]) > 0.0
+        return self.opening.law == "both" and float(self.fitted.low[1]) > 0.0
 
     @property
     def text(self) -> str:
         """Law with its quantities, ``law = 'iso6358' (C = 4.0e-03 L/(s bar), b = 0.40)``."""
-        names, quantities = [number.name for number in self.fitted.numbers], list[str]()
-        for number in self.reported:
+        quantities = list[str]()
+        for row, number in enumerate(self.fitted.numbers):
             name = number.path.rpartition(".")[2]
             symbol = _SYMBOLS.get(name.removesuffix("_over_volume"))
-            if symbol is not None:
-                row = names.index(number.path)
+            if number.text and symbol is not None:
                 ends = (float(values[row]) for values in (self.fitted.values, self.fitted.low, self.fitted.high))
                 (value, unit), (low, _), (high, _) = (in_shown_unit(each, number.unit) for each in ends)
                 symbol = f"{symbol}/V" if name.endswith("_over_volume") else symbol
@@ -360,13 +354,20 @@ class VaneLeakProblem(FlowLaw, TimedLaw):
         discharge_coefficient, critical_ratio = (
             context.number(f"actuator.leak.{name}") for name in ("discharge_coefficient", "critical_ratio")
         )
-        laws = list[tuple[Opening, ReportedNumber]]()
+        laws, of_set = list[Opening](), None
+        if discharge_coefficient:
+            text = (
+                f"Area of the leak with Cd = {discharge_coefficient:g} of the set; only the product Cd A is "
+                f"identified: a sharp-edged hole, of Cd = {_SHARP:g}, would have {discharge_coefficient / _SHARP:.3g} "
+                "times this area"
+            )
+            of_set = reported("actuator.leak.area", "m^2", text)
         for each in (self.law, *RIVALS.get(self.law, ())):
             # An orifice has the form of the set; the law ``iso6358`` seeks b.
             form: Law = "iso6358" if each == "orifice" and critical_ratio is not None else each
             known_ratio = None if each == "iso6358" else critical_ratio
-            opening = Opening(gas, form, discharge_coefficient or PRODUCT_ONLY, known_ratio)
-            laws.append((opening, _size(opening, discharge_coefficient)))
+            size = size_of("leak", "actuator.leak", form, known_ratio, of_set)
+            laws.append(Opening(gas, form, discharge_coefficient or PRODUCT_ONLY, known_ratio, size, _GAP))
         if all("mass_flow" in source.recording for source in sources):
             result = _steady_leak(sources, laws, context.tolerances, self.confidence)
         else:
@@ -383,26 +384,9 @@ class VaneLeakProblem(FlowLaw, TimedLaw):
         return replace(result, estimates=estimates, remarks=(*result.remarks, remark))
 
 
-def _size(opening: Opening, discharge_coefficient: float | None) -> ReportedNumber:
-    """Return the reported size of the leak: path in a set, unit and description."""
-    if opening.law == "laminar":
-        return ReportedNumber("vane_leak.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of the leak")
-    if opening.law == "iso6358" or opening.critical_ratio is not None:
-        ratio = opening.critical_ratio
-        text = "Sonic conductance C of the leak" + ("" if ratio is None else f" with the set's b = {ratio:g}")
-        return ReportedNumber("actuator.leak.sonic_conductance", "m^3/(s Pa)", text)
-    if discharge_coefficient:
-        text = (
-            f"Area of the leak with Cd = {discharge_coefficient:g} of the set; only the product Cd A is identified: a "
-            f"sharp-edged hole, of Cd = {_SHARP:g}, would have {discharge_coefficient / _SHARP:.3g} times this area"
-        )
-        return ReportedNumber("actuator.leak.area", "m^2", text)
-    return ReportedNumber("vane_leak.effective_area", "m^2", "Effective area Cd A of the leak")
-
-
 def _steady_leak(
     sources: tuple[RecordingSource, ...],
-    laws: _Laws,
+    laws: Sequence[Opening],
     tolerances: Tolerances,
     confidence: float,
 ) -> BenchResult:
@@ -423,14 +407,11 @@ def _steady_leak(
     pressures = {"pressure_1": first, "pressure_2": second}
     readings = PooledReadings(flow, ["mass_flow"] * flow.size, labels, (halves,))
     ratio, fits = np.minimum(first, second) / np.maximum(first, second), list[LawFit]()
-    if laws[0][0].has_sought_ratio:
+    if laws[0].has_sought_ratio:
         check_both_regimes(ratio, sources[0])
-    is_wide = has_both_regimes(ratio)
-    for opening, size in laws:
-        _, alone = opening.rough_sizes(first, second, flow)
-        reported, paths = reported_parts(opening, size, _GAP, alone)
-        fitted, model = solve_flow(opening, paths, pressures, readings, tolerances, confidence, _TRIAL_RATIOS)
-        fits.append(LawFit(opening=opening, reported=reported, fitted=fitted, model=model, has_both_regimes=is_wide))
+    for opening in laws:
+        fitted, model = solve_flow(opening, pressures, readings, tolerances, confidence, _TRIAL_RATIOS)
+        fits.append(LawFit(opening, fitted, model, has_both_regimes(ratio)))
     chosen = fits[0]
     scatter = float(np.std(flow - chosen.model) / np.abs(flow).max())
     curve = curve_mark(LAW_NAMES[chosen.opening.law], difference, chosen.model)
@@ -462,7 +443,7 @@ def _compared(
     chosen, rival = fits[0], fits[-1]
     advantage = rival.fitted.log_likelihood - chosen.fitted.log_likelihood
     reason = "" if rival is chosen or (rival.is_sound and advantage > -_CLEAR) else _NEITHER
-    result = result_of(sources, chosen.fitted, chosen.reported, summary, panels, reason, remarks, scatter)
+    result = result_of(sources, chosen.fitted, summary, panels, reason, remarks, scatter)
     if rival is chosen:
         return result
     if advantage >= _CLEAR:
@@ -494,7 +475,7 @@ def _compared(
 def _closed_leak(
     sources: tuple[RecordingSource, ...],
     window: tuple[float | None, float | None],
-    laws: _Laws,
+    laws: Sequence[Opening],
     volumes: tuple[float | None, float | None, float],
     tolerances: Tolerances,
     confidence: float,
@@ -517,16 +498,15 @@ def _closed_leak(
     first, second, volume_deviation = volumes
     volume, other_volume = (first, second) if chamber == 1 else (second, first)
     ratio = np.concatenate([decay.second / decay.first for decay in decays])
-    if laws[0][0].has_sought_ratio:
+    if laws[0].has_sought_ratio:
         check_both_regimes(ratio, sources[0])
-    is_wide = has_both_regimes(ratio)
-    assumed_volume, gap = volume or _UNIT_VOLUME, _GAP
+    assumed_volume = volume or _UNIT_VOLUME
     if volume is None:
-        laws = tuple((replace(opening, known=PRODUCT_ONLY), _over_volume(size, chamber)) for opening, size in laws)
-        gap = _over_volume(gap, chamber)
+        over = partial(_over_volume, chamber=chamber)
+        laws = [replace(item, known=PRODUCT_ONLY, size=over(item.size), gap=over(item.gap)) for item in laws]
     others = (
         *_unknowns(decays, volume, other_volume, volume_deviation),
-        *gas_tolerances(laws[0][0].gas, tolerances),
+        *gas_tolerances(laws[0].gas, tolerances),
         *tolerance(_VOLUME, volume_deviation if volume else 0.0),
         *(zero for sensor, _ in decays[0].sensors for zero in within(f"zero of {sensor}", tolerances.zero_of_pressure)),
     )
@@ -534,17 +514,16 @@ def _closed_leak(
     halves = (int(np.argmax(decay.first - decay.second < 0.5 * sum(decay.ends))) for decay in decays)
     parts = zip(halves, (decay.fitted for decay in decays), strict=True)
     readings, fits = halved_readings(sources, parts, ("the early fall", "the late fall")), list[LawFit]()
-    for opening, size in laws:
-        start, alone = _rough_sizes(decays, opening, assumed_volume)
-        reported, paths = reported_parts(opening, size, gap, alone)
-        shown = partial(_shown_pressures, decays=decays, opening=opening, paths=paths, volume=assumed_volume)
-        fitted, model = solve(shown, readings, (*paths.sought(start, alone), *others), confidence)
-        fits.append(LawFit(opening=opening, reported=reported, fitted=fitted, model=model, has_both_regimes=is_wide))
+    for opening in laws:
+        shown = partial(_shown_pressures, decays=decays, opening=opening, volume=assumed_volume)
+        unknowns = opening.unknowns(*_rough_sizes(decays, opening, assumed_volume))
+        fitted, model = solve(shown, readings, (*unknowns, *others), confidence)
+        fits.append(LawFit(opening, fitted, model, has_both_regimes(ratio)))
     model = fits[0].model
     times = [decay.time for decay in decays for _ in decay.fitted]
     time, models = np.concatenate(times), np.split(model, np.cumsum([values.size for values in times])[:-1])
     # The legend names the first curve only.
-    names = [LAW_NAMES[laws[0][0].law], *[""] * (len(times) - 1)]
+    names = [LAW_NAMES[laws[0].law], *[""] * (len(times) - 1)]
     marks = [readings_mark("measured", time, readings.measured)]
     marks += [curve_mark(*curve) for curve in zip(names, times, models, strict=True)]
     if all(decay.room is not None for decay in decays):
@@ -562,12 +541,12 @@ def _closed_leak(
     )
 
 
-def _over_volume(size: ReportedNumber, chamber: int) -> ReportedNumber:
+def _over_volume(size: FitNumber, chamber: int) -> FitNumber:
     """Return the reported size of the leak divided by the unknown volume of a chamber."""
     text = f"{size.text.partition(' with')[0]} over the volume of chamber {chamber}, which is not known"
     if size.unit == "m^2":
-        return ReportedNumber("vane_leak.area_over_volume", "1/m", text)
-    return ReportedNumber(f"vane_leak.{size.path.split('.')[-1]}_over_volume", f"{size.unit[:-1]} m^3)", text)
+        return reported("vane_leak.area_over_volume", "1/m", text)
+    return reported(f"vane_leak.{size.path.split('.')[-1]}_over_volume", f"{size.unit[:-1]} m^3)", text)
 
 
 def _rough_sizes(
@@ -593,13 +572,13 @@ def _rough_sizes(
 
 def _unknowns(
     decays: tuple[ChamberDecay, ...], volume: float | None, other_volume: float | None, deviation: float
-) -> list[FitVariable]:
+) -> list[FitNumber]:
     """Return the unknowns of closed chambers: volume ratio, initial pressures, and relaxation after filling.
 
     The volume ratio is left out if one chamber is a room. It has a prior if both volumes [m^3] are known, each with the
     relative standard ``deviation`` [-]. The initial pressure of a room has a prior from the samples of the room.
     """
-    unknowns = list[FitVariable]()
+    unknowns = list[FitNumber]()
     changes = [decay.changes for decay in decays if decay.room is None]
     if changes and volume and other_volume:
         ratio = volume / other_volume
@@ -618,12 +597,10 @@ def _unknowns(
         for sensor, _ in decay.fitted:
             unknowns += within(_RELAXED_BY.format(sensor, decay.number), _MOST_RELAXED)
     # Only the order of magnitude of tau is known, so the variable is its logarithm.
-    return [*unknowns, FitVariable(_RELAXATION, 0.0, low=-5.0, high=math.log(_RELAXED), scale=1.0, deviation=1.5)]
+    return [*unknowns, FitNumber(_RELAXATION, 0.0, low=-5.0, high=math.log(_RELAXED), scale=1.0, deviation=1.5)]
 
 
-def _shown_pressures(
-    at: Values, decays: tuple[ChamberDecay, ...], opening: Opening, paths: Paths, volume: float
-) -> Floats:
+def _shown_pressures(at: Values, decays: tuple[ChamberDecay, ...], opening: Opening, volume: float) -> Floats:
     """Return the readings of the fitted sensors [Pa] over all decays, for values ``at`` of the fit variables.
 
         P_shown = P (1 + r exp(-t / tau)) + zero,   k = R sqrt(T_0 T) (1 + gas law) / (V (1 + volume))
@@ -640,7 +617,7 @@ def _shown_pressures(
     for decay in decays:
         first, second = (at[_START.format(sensor, decay.number)] for sensor, _ in decay.sensors)
         ratio = at[_RATIO] if decay.room is None else 0.0 if decay.room == 1 else math.inf
-        falls = pressures_of_fall(opening, paths.sizes(at), first, second, ratio, rate, decay.time)
+        falls = pressures_of_fall(opening, opening.sizes(at), first, second, ratio, rate, decay.time)
         faded = np.exp(-decay.time / relaxation_time)
         for side, ((sensor, _), pressure) in enumerate(zip(decay.sensors, falls, strict=True)):
             if side != decay.room:

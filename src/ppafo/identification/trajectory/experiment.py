@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from ppafo.errors import IdentificationError, PpafoError, noted_in, raise_noted
-from ppafo.identification.least_squares import FitVariable
+from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.new_set import fitting_unit, stated_half_width
 from ppafo.identification.source import UsedRecording, double_use
 from ppafo.identification.tolerances import Tolerances
@@ -282,49 +282,7 @@ def broken_rule(device: Device) -> str:
     return ""
 
 
-@dataclass(frozen=True, slots=True)
-class FreeParameter:
-    """Parameter varied by the fit, by path such as ``friction.viscous_damping`` or ``initial.pressure_1``, in SI units.
-
-    ``start`` defaults to the value of the scenario. ``low`` and ``high`` default to the declared bounds, at most a
-    factor of 100 from the start. ``deviation`` is the standard deviation of a normal prior about the start, infinite
-    for none. ``recordings`` are the labels of the experiments to which the parameter is limited, empty for all.
-    ``is_tolerance`` marks a quantity known within a tolerance, which is not an unknown of the device. With
-    ``is_logarithm`` the natural logarithm is varied, and ``deviation`` refers to the logarithm.
-    """
-
-    path: str
-    start: float | None = None
-    low: float | None = None
-    high: float | None = None
-    deviation: float = math.inf
-    recordings: tuple[str, ...] = ()
-    is_tolerance: bool = False
-    is_logarithm: bool = False
-
-    @property
-    def name(self) -> str:
-        """Path, followed by the labels of the experiments if the parameter is limited to some of them."""
-        return f"{self.path} of {', '.join(self.recordings)}" if self.recordings else self.path
-
-
-@dataclass(frozen=True, slots=True)
-class FitNumber:
-    """Parameter resolved for a fit: full path, SI unit, and the variable of the estimator."""
-
-    path: str
-    unit: str
-    free: FitVariable
-    recordings: tuple[str, ...]
-    is_tolerance: bool
-    is_logarithm: bool
-
-    def acts_in(self, label: str) -> bool:
-        """Return whether the parameter acts in the experiment with this label."""
-        return not self.recordings or label in self.recordings
-
-
-def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment]) -> FitNumber:
+def number_of(parameter: FitNumber, experiments: Sequence[FittedExperiment]) -> FitNumber:
     """Return a parameter with start, bounds and scale resolved, given the experiments in which it acts.
 
     Raises IdentificationError for contradictory settings.
@@ -350,7 +308,7 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
                 "parameter has no effect"
             )
     start = parameter.start
-    if start is None:
+    if math.isnan(start):
         # Of how a run begins the recording may say more than the scenario.
         is_state = path.partition(".")[0] in _STATE
         start = number_at(scenario_of(experiments[0]) if is_state else scenarios[0], path)
@@ -360,14 +318,16 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
     elif start > 0.0:
         # A number above 0 is bounded by factors: with 0 as its lower bound a valve or an effect would be another model.
         low, high = max(low, start / _FURTHEST) if low >= 0.0 else low, min(high, start * _FURTHEST)
-    low, high = (low if parameter.low is None else parameter.low), (high if parameter.high is None else parameter.high)
+    low, high = (
+        low if math.isnan(parameter.low) else parameter.low,
+        high if math.isnan(parameter.high) else parameter.high,
+    )
     bounds = f"{low:.6g} and {high:.6g}"
     has_size = math.isfinite(high - low) or math.isfinite(parameter.deviation)
     is_allowed = quantity.minimum <= low and high <= quantity.maximum
     allowed = f"{quantity.minimum:.6g} to {quantity.maximum:.6g} {quantity.unit}".rstrip()
     refuse_first(
         parameter.name,
-        (not math.isfinite(start) or math.isnan(low) or math.isnan(high), "start and bounds must be finite numbers"),
         (not low < high, f"low = {low:.6g} must be below high = {high:.6g}"),
         (not low <= start <= high, f"start = {start:.6g} must lie between the bounds {bounds}"),
         (start == 0.0 and not has_size, "start = 0 needs bounds, which define the step size of the search"),
@@ -384,9 +344,10 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
     scale = abs(start) or 0.5 * (high - low)
     if math.isfinite(parameter.deviation):
         scale = _SCALE * parameter.deviation
-    free = FitVariable(full_path(parameter.name, scenarios[0]), start, low, high, scale, parameter.deviation)
     unit = quantity.unit.removesuffix("_a").removesuffix("_d") or "-"
-    return FitNumber(path, unit, free, parameter.recordings, parameter.is_tolerance, parameter.is_logarithm)
+    # Of a quantity of either sign, such as the zero of a sensor, the value may be zero.
+    size = scale if low < 0.0 < high else None
+    return replace(parameter, path=path, start=start, low=low, high=high, scale=scale, unit=unit, size=size)
 
 
 def _is_off_at_zero(scenario: Scenario, path: str, value: float) -> bool:
@@ -403,7 +364,7 @@ def _is_off_at_zero(scenario: Scenario, path: str, value: float) -> bool:
 
 def reach_of(chosen: Sequence[FitNumber]) -> float:
     """Return the largest time offset [s] that the bounds of the parameters allow; 0 if none is fitted."""
-    bounds = [bound for number in chosen if number.path == TIME_OFFSET for bound in (number.free.low, number.free.high)]
+    bounds = [bound for number in chosen if number.path == TIME_OFFSET for bound in (number.low, number.high)]
     return max(map(abs, bounds), default=0.0)
 
 
@@ -411,7 +372,7 @@ def reach_of(chosen: Sequence[FitNumber]) -> float:
 class TrajectoryProblem:
     """Trajectory fit problem: parameters and experiments. Raises IdentificationError if inconsistent."""
 
-    parameters: tuple[FreeParameter, ...]
+    parameters: tuple[FitNumber, ...]
     experiments: tuple[FittedExperiment, ...]
     confidence: float = 0.95
 
@@ -427,7 +388,7 @@ class TrajectoryProblem:
                 if label not in labels:
                     known = known_names(label, labels)
                     raise IdentificationError(f"{parameter.path}: there is no experiment '{label}'{known}")
-        _refuse_twice("parameter", [number.free.name for number in numbers_of(self)])
+        _refuse_twice("parameter", [number.name for number in numbers_of(self)])
 
 
 def numbers_of(problem: TrajectoryProblem) -> tuple[FitNumber, ...]:
@@ -461,14 +422,14 @@ def stated_by(parameter_set: ParameterSet, scenario: Scenario) -> dict[str, floa
 def tolerance_parameters(
     tolerances: Tolerances,
     experiments: Sequence[FittedExperiment],
-    fitted: Sequence[FreeParameter],
+    fitted: Sequence[FitNumber],
     stated: Mapping[str, float] | None = None,
-) -> tuple[FreeParameter, ...]:
+) -> tuple[FitNumber, ...]:
     """Return all tolerances, except parameters already ``fitted``, as fit parameters with priors.
 
     ``stated`` are the half-widths of the 95 % intervals stated in the set [SI], by path.
     """
-    parameters: list[FreeParameter] = []
+    parameters: list[FitNumber] = []
     for experiment in experiments:
         free = {
             full_path(item.path, experiment.scenario)
@@ -510,9 +471,7 @@ def tolerance_parameters(
     )
 
 
-def _stribeck(
-    tolerances: Tolerances, experiments: Sequence[FittedExperiment], given: set[str]
-) -> Iterator[FreeParameter]:
+def _stribeck(tolerances: Tolerances, experiments: Sequence[FittedExperiment], given: set[str]) -> Iterator[FitNumber]:
     """Yield Stribeck velocity and share of the fall to dynamic friction as parameters, unless the set defines them.
 
     With an abrupt fall, static friction trades off against damping. The static friction seen in a step response varies
@@ -526,15 +485,9 @@ def _stribeck(
         return
     is_sought = _STRIBECK in given
     if not is_sought and limit > 0.0:
-        yield FreeParameter(
-            _STRIBECK,
-            limit * math.exp(-_ONE_SIDED * _FACTOR),
-            _LEAST * limit,
-            4.0 * limit,
-            _FACTOR,
-            is_tolerance=True,
-            is_logarithm=True,
-        )
+        start = limit * math.exp(-_ONE_SIDED * _FACTOR)
+        low, high = _LEAST * limit, 4.0 * limit
+        yield FitNumber(_STRIBECK, start, low, high, deviation=_FACTOR, is_tolerance=True, is_logarithm=True)
     share = number_at(scenario, _SHARE)
     deviation = tolerances.deviation_of(_SHARE, share, 0.0)
     if (is_sought or limit > 0.0) and _SHARE not in given and deviation > 0.0:
@@ -578,7 +531,7 @@ def _read_error(recording: Recording, name: str) -> float:
 
 def _of_set(
     tolerances: Tolerances, experiments: Sequence[FittedExperiment], given: set[str], stated: Mapping[str, float]
-) -> Iterator[FreeParameter]:
+) -> Iterator[FitNumber]:
     """Yield the fixed parameters of the device as fit parameters, each with its uncertainty as prior.
 
     A parameter linked to another one has no uncertainty of its own.
@@ -602,15 +555,15 @@ def _of_set(
             yield _held(path, value, deviation, quantity)
 
 
-def _held(path: str, value: float, deviation: float, quantity: Quantity) -> FreeParameter:
+def _held(path: str, value: float, deviation: float, quantity: Quantity) -> FitNumber:
     """Return a fixed parameter of the device, with its standard deviation [SI] as prior, as a fit parameter."""
     low = max(quantity.minimum, value - _WIDEST * deviation)
     high = min(quantity.maximum, value + _WIDEST * deviation)
     # A volume or a friction of 0 would make no device.
     low = max(low, 0.05 * value) if quantity.minimum >= 0.0 else low
-    return FreeParameter(path, value, low, high, deviation, is_tolerance=True)
+    return FitNumber(path, value, low, high, deviation=deviation, is_tolerance=True)
 
 
-def _parameter(path: str, start: float, deviation: float, recordings: tuple[str, ...]) -> FreeParameter:
+def _parameter(path: str, start: float, deviation: float, recordings: tuple[str, ...]) -> FitNumber:
     width = _WIDEST * deviation
-    return FreeParameter(path, start, start - width, start + width, deviation, recordings, is_tolerance=True)
+    return FitNumber(path, start, start - width, start + width, 1.0, deviation, recordings, is_tolerance=True)

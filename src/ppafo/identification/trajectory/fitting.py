@@ -23,10 +23,10 @@ from ppafo.engine.run import NEVER_FAILED, Run, batches_of, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError, refused_as
-from ppafo.identification.estimate import UNKNOWN, Estimate, Verdict, in_shown_unit, relative_half_width
-from ppafo.identification.fit import Fit, conflict_in_words, widened_by
+from ppafo.identification.estimate import Estimate, in_shown_unit
+from ppafo.identification.fit import Fit, conflict_in_words, estimate_of
 from ppafo.identification.fit import fit as fit_residuals
-from ppafo.identification.least_squares import FitRuns, FitVariable, ResidualBlock
+from ppafo.identification.least_squares import FitNumber, FitRuns, ResidualBlock
 from ppafo.identification.noise import Noise, whiten
 from ppafo.identification.source import kind_of
 from ppafo.identification.trajectory.experiment import (
@@ -35,7 +35,6 @@ from ppafo.identification.trajectory.experiment import (
     LAG_OF,
     TIME_OFFSET,
     ZERO_OF,
-    FitNumber,
     FittedExperiment,
     TrajectoryProblem,
     broken_rule,
@@ -74,12 +73,6 @@ _FELT = 1.0e-3
 """Least residuals that are tested as bursts [ranges of the samples]; smaller ones are the engine's."""
 _BURST = 6.0
 """Ratio of residuals to the noise that lasts [-] from which they are no noise; slow noise has up to 5.5."""
-_OWN_SHARE = 0.2
-"""Weight in an undetermined combination [-] from which a parameter itself counts as not identifiable."""
-_AT_BOUND = 1.0e-6
-"""Relative distance from a bound [-] up to which an estimate counts as at its bound."""
-_NEAR = 1.0e-3
-"""Same distance, as a fraction of the width of the interval [-]."""
 _WHOLE = 1.0e-6
 """Rounding tolerance of the last sample interval, as a fraction of an interval [-]."""
 Indices = NDArray[np.intp]
@@ -549,31 +542,37 @@ def _follow_each_other(residuals: Floats) -> bool:
 
 def _fit_of(problem: TrajectoryProblem, numbers: tuple[FitNumber, ...], report: Report) -> TrajectoryFit:
     """Return the fit of some numbers of a problem; those that are left out stay at their start values."""
-    free = [number.free for number in numbers]
-    start = np.array([number.start for number in free])
+    start = np.array([number.start for number in numbers])
     rows = {(item.path, item.recordings): row for row, item in enumerate(numbers) if not item.is_tolerance}
-    sought = list(free)
+    sought = list(numbers)
     for (path, labels), row in rows.items():
         dynamic = rows.get((_DYNAMIC, labels))
-        if path == _STATIC and dynamic is not None and math.isinf(free[row].deviation):
-            sought[row] = _excess(free[row], free[dynamic])
+        if path == _STATIC and dynamic is not None and math.isinf(numbers[row].deviation):
+            sought[row] = _excess(numbers[row], numbers[dynamic])
     runs = []
     for experiment in problem.experiments:
         reach = reach_of([number for number in numbers if number.acts_in(experiment.label)])
         runs.append(prepare(experiment, numbers_in(experiment.label, numbers, start), reach))
-    report(Progress(f"trajectory fit: {len(free)} numbers, {len(runs)} recordings"))
+    report(Progress(f"trajectory fit: {len(numbers)} numbers, {len(runs)} recordings"))
     blocks = blocks_of(runs, numbers, start)
     residuals = partial(residuals_of, runs, numbers)
-    for variables in (sought, free):
+    for variables in (sought, numbers):
         fitted = fit_residuals(residuals, variables, blocks, problem.confidence, report, is_motion=True)
         # Bounds of friction at rest that its excess does not keep are kept by a search within them.
         excesses = [row for row, variable in enumerate(variables) if variable.base]
-        if all(free[row].low <= fitted.values[row] <= free[row].high for row in excesses):
+        if all(numbers[row].low <= fitted.values[row] <= numbers[row].high for row in excesses):
             break
-    return _result(problem, numbers, runs, blocks, fitted)
+    for row in excesses:
+        # Of friction at rest the bounds are its own; that it is above friction in motion stays.
+        fitted.low[row], fitted.high[row] = (
+            max(fitted.low[row], numbers[row].low),
+            min(fitted.high[row], numbers[row].high),
+        )
+    own = tuple(replace(number, base=searched.base) for number, searched in zip(numbers, fitted.numbers, strict=True))
+    return _result(problem, numbers, runs, blocks, replace(fitted, numbers=own))
 
 
-def _excess(static: FitVariable, dynamic: FitVariable) -> FitVariable:
+def _excess(static: FitNumber, dynamic: FitNumber) -> FitNumber:
     """Return friction at rest as the excess over friction in motion, since it is at least as large."""
     low, high = max(static.low - dynamic.high, 0.0), static.high - dynamic.low
     if not low < high:
@@ -625,16 +624,20 @@ def _result(
     conflict = conflict_in_words(fitted) or _wandering(fitted, numbers) or _bursting(measurements, models)
     # Tolerances are marginalised: their rows are left out, their share of the variance stays.
     rows = [row for row, number in enumerate(numbers) if not number.is_tolerance]
-    estimates = tuple(_estimate(problem, fitted, numbers[row], row, conflict) for row in rows)
+    estimates = tuple(
+        estimate_of(fitted, row, [one.source or one.recording.label for one in experiments], conflict)
+        for row in rows
+        for experiments in [[one for one in problem.experiments if numbers[row].acts_in(one.label)]]
+    )
     errors = np.sqrt(np.diag(fitted.covariance))
     covariance = fitted.covariance[np.ix_(rows, rows)]
     known = list[NuisanceParameter]()
     for row, number in enumerate(numbers):
         if number.is_tolerance:
-            name, free = number.free.name, number.free
+            name = number.name
             shares = {estimate.path: dict(fitted.shares[estimate.path]).get(name, 0.0) for estimate in estimates}
             widens = max(shares, key=lambda path: shares[path], default="")
-            pairs = [(free.start, free.deviation), (float(fitted.values[row]), float(errors[row]))]
+            pairs = [(number.start, number.deviation), (float(fitted.values[row]), float(errors[row]))]
             if number.is_logarithm:
                 pairs = [(math.exp(value), math.exp(value) * deviation) for value, deviation in pairs]
             known.append(NuisanceParameter(name, number.unit, *pairs[0], *pairs[1], widens, shares.get(widens, 0.0)))
@@ -672,7 +675,7 @@ def _wandering(fitted: Fit, numbers: tuple[FitNumber, ...]) -> str:
     """
     for number in (number for number in numbers if number.path.startswith(ZERO_OF)):
         channel = number.path.removeprefix(ZERO_OF)
-        noise, limit = fitted.sensors.get(channel), math.sqrt(3.0) * number.free.deviation
+        noise, limit = fitted.sensors.get(channel), math.sqrt(3.0) * number.deviation
         if noise is None or not math.isfinite(limit):
             continue
         wander = noise.deviation * math.sqrt(max(1.0 - noise.innovation**2, 0.0))
@@ -698,57 +701,6 @@ def _bursting(measurements: Sequence[Recording], models: Sequence[Recording]) ->
                     "that lasts"
                 )
     return ""
-
-
-def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: int, conflict: str) -> Estimate:
-    """Return the estimate of one parameter with its verdict and explanation."""
-    value, low, high = (float(column[row]) for column in (fitted.values, fitted.low, fitted.high))
-    name, free = number.free.name, fitted.numbers[row]
-    base = fitted.by_name.get(free.base, 0.0)
-    bounds = [max(base + free.low, number.free.low), min(base + free.high, number.free.high)]
-    if free.base:
-        low, high = max(low, number.free.low), min(high, number.free.high)
-    bound = next(
-        (end for end in bounds if abs(value - end) <= max(_AT_BOUND * abs(end or 1.0), _NEAR * (high - low))), None
-    )
-    combination = next((weights for weights in fitted.unidentified if abs(weights.get(name, 0.0)) >= _OWN_SHARE), None)
-    verdict: Verdict = "identified"
-    # Of a quantity of either sign, such as the zero of a sensor, the value may be zero.
-    size = free.scale if free.low < 0.0 < free.high else None
-    if combination is not None:
-        verdict = "not identifiable"
-        # So far from where it was linearised the interval of a straight line means nothing.
-        low, high = min(low, bounds[0]), max(high, bounds[1])
-        others = [other for other in combination if other != name]
-        text = f"trades off against {' and '.join(others)}"
-        if not others:
-            # Where the model lacks something, that may be what moves a number so far from its start.
-            text = conflict or "the recordings are hardly sensitive to this parameter"
-    elif bound is not None and not free.base:
-        end, unit = in_shown_unit(bound, number.unit)
-        verdict, text = "at its bound", f"the recordings favour a value at or beyond {end:.6g} {unit}".rstrip(" -")
-    elif relative_half_width(value, low, high, size) >= UNKNOWN:
-        verdict = "not identifiable"
-        text = f"{widened_by(fitted, name)}; the interval includes zero or twice the value"
-    elif conflict:
-        # Said of every number: which of them the missing physics moves is not known.
-        verdict, text = "holds for this model only", conflict
-    else:
-        text = widened_by(fitted, name)
-        cut = [
-            bound for bound, end in zip(bounds, (low, high), strict=True) if abs(end - bound) <= _AT_BOUND * abs(end)
-        ]
-        if free.base and low <= base:
-            text += f"; the interval contains its bound, {free.base}"
-        elif cut:
-            end, unit = in_shown_unit(cut[0], number.unit)
-            text += f"; the interval ends at its bound, {end:.4g} {unit}".rstrip(" -")
-    recordings = tuple(
-        experiment.source or experiment.recording.label
-        for experiment in problem.experiments
-        if number.acts_in(experiment.label)
-    )
-    return Estimate(name, value, number.unit, low, high, verdict, text, recordings, problem.confidence, size)
 
 
 @dataclass(frozen=True, slots=True)
@@ -811,7 +763,7 @@ def _benefit(fit: TrajectoryFit, candidate: CandidateExperiment) -> ExpectedBene
     information[np.ix_(common, common)] += jacobian.T @ jacobian
     after = np.linalg.inv(information)
     unknowns = [index for index, number in enumerate(fit.numbers) if not number.is_tolerance]
-    shrinkage = {fit.numbers[index].free.name: math.sqrt(max(after[index, index], 0.0)) for index in unknowns}
+    shrinkage = {fit.numbers[index].name: math.sqrt(max(after[index, index], 0.0)) for index in unknowns}
     rows = np.ix_(unknowns, unknowns)
     gain = 0.5 * float(np.linalg.slogdet(before[rows])[1] - np.linalg.slogdet(after[rows])[1])
     return ExpectedBenefit(candidate.label, gain, shrinkage, min(shrinkage, key=lambda name: shrinkage[name]))
@@ -831,7 +783,7 @@ def _slopes(
         signals = signals_at(prepared, columns_in("", numbers, points), points.shape[1])
         return np.concatenate([signals[name] for name in noise])
 
-    runs = FitRuns(samples, tuple(number.free for number in numbers), (), report_nothing, 0, is_motion=True)
+    runs = FitRuns(samples, tuple(numbers), (), report_nothing, 0, is_motion=True)
     with refused_as(IdentificationError, f"candidate '{candidate.label}'", IdentificationError):
         # As in the fit, a difference is as long as changes the samples by three units of noise in all.
         weight = 1.0 / np.repeat(list(noise.values()), times.size)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from ppafo.errors import DataError, IdentificationError, ScenarioError
 from ppafo.identification.estimate import Estimate, in_shown_unit, interval_factor
+from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.problem import ExperimentSection, ParameterSection, TrajectorySection
 from ppafo.identification.source import RecordingSource, UsedRecording, double_use, remarks_on_readings
 from ppafo.identification.tolerances import Tolerances, quantity_of
@@ -18,7 +19,6 @@ from ppafo.identification.trajectory.experiment import (
     INPUTS,
     TIME_OFFSET,
     FittedExperiment,
-    FreeParameter,
     InitialState,
     TrajectoryProblem,
     declaration_of,
@@ -98,7 +98,7 @@ def trajectory_problem(section: TrajectorySection, context: SectionContext) -> T
             # The delay of the samples of one recording is known within a limit, as a tolerance is.
             deviation = deviation_of_limit(limit)
             parameters.append(
-                FreeParameter(TIME_OFFSET, 0.0, -limit, limit, deviation, (entry.label,), is_tolerance=True)
+                FitNumber(TIME_OFFSET, 0.0, -limit, limit, 1.0, deviation, (entry.label,), is_tolerance=True)
             )
     stated = stated_by(context.parameter_set, experiments[0].scenario)
     tolerances = tolerance_parameters(context.tolerances, experiments, parameters, stated)
@@ -141,7 +141,7 @@ def _scenario(name: str, overrides: tuple[str, ...], context: SectionContext) ->
     return load_scenario(name_or_file, over(chosen, overrides, ScenarioError), context.parameter_set)
 
 
-def _parameter(entry: ParameterSection, scenarios: Mapping[str, Scenario], context: SectionContext) -> FreeParameter:
+def _parameter(entry: ParameterSection, scenarios: Mapping[str, Scenario], context: SectionContext) -> FitNumber:
     """Convert a table of a section to a parameter to fit [SI]; ``scenarios`` are by label of the experiment."""
     scenario = next((scenarios[label] for label in entry.recordings if label in scenarios), None)
     acting = scenario or next(iter(scenarios.values()))
@@ -150,7 +150,7 @@ def _parameter(entry: ParameterSection, scenarios: Mapping[str, Scenario], conte
     where = f"{context.file}: parameter '{entry.path}'"
     stated = {key: getattr(entry, key) for key in ("start", "low", "high")}
     start, low, high = (
-        None if text is None else quantity_of(f"{where}: {key}", text, quantity.unit, atmosphere)
+        math.nan if text is None else quantity_of(f"{where}: {key}", text, quantity.unit, atmosphere)
         for key, text in stated.items()
     )
     deviation = math.inf
@@ -166,7 +166,7 @@ def _parameter(entry: ParameterSection, scenarios: Mapping[str, Scenario], conte
     elif entry.prior is not None:
         start = quantity_of(f"{where}: prior.mean", entry.prior.mean, quantity.unit, atmosphere)
         deviation = abs(start) * entry.prior.relative
-    return FreeParameter(entry.path, start, low, high, deviation, entry.recordings)
+    return FitNumber(entry.path, start, low, high, 1.0, deviation, entry.recordings)
 
 
 def _replay(

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory.experiment import FittedExperiment, FreeParameter, TrajectoryProblem
+from ppafo.identification.least_squares import FitNumber
+from ppafo.identification.trajectory.experiment import FittedExperiment, TrajectoryProblem
 from ppafo.identification.trajectory.fitting import CandidateExperiment, TrajectoryFit, expected_information, fit
 from ppafo.simulation.loading import load_scenario
 from tests.unit.identification.trajectory.conftest import NOISE
@@ -16,7 +17,7 @@ from tests.unit.identification.trajectory.conftest import NOISE
 def found(experiment: FittedExperiment) -> TrajectoryFit:
     """Flow, damping and leak from a step response, in which the leak hardly shows."""
     paths = ("valve.discharge_coefficient", "friction.viscous_damping", "actuator.leak.area")
-    return fit(TrajectoryProblem(tuple(FreeParameter(path) for path in paths), (experiment,)))
+    return fit(TrajectoryProblem(tuple(FitNumber(path) for path in paths), (experiment,)))
 
 
 def test_the_experiment_that_lets_the_leak_be_seen_is_recommended_before_the_same_again(found: TrajectoryFit) -> None:

@@ -9,10 +9,10 @@ import pytest
 
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import batch_of, state_row_numbers
+from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.trajectory import fitting
 from ppafo.identification.trajectory.experiment import (
     FittedExperiment,
-    FreeParameter,
     TrajectoryProblem,
     number_at,
     numbers_of,
@@ -25,12 +25,12 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 
-INERTIA = FreeParameter("foot_plate.inertia", start=0.010)
-FLOW = FreeParameter("valve.discharge_coefficient", start=0.10)
-DAMPING = FreeParameter("friction.viscous_damping", start=0.025)
+INERTIA = FitNumber("foot_plate.inertia", start=0.010)
+FLOW = FitNumber("valve.discharge_coefficient", start=0.10)
+DAMPING = FitNumber("friction.viscous_damping", start=0.025)
 
 
-def fitted(experiment: FittedExperiment, *parameters: FreeParameter) -> TrajectoryFit:
+def fitted(experiment: FittedExperiment, *parameters: FitNumber) -> TrajectoryFit:
     return fit(TrajectoryProblem(parameters, (experiment,)))
 
 
@@ -102,7 +102,7 @@ def test_columns_are_the_runs_that_simulate_makes_with_less_error(experiment: Fi
 
 
 def test_area_and_discharge_coefficient_are_not_identifiable_together(experiment: FittedExperiment) -> None:
-    found = fitted(experiment, FLOW, FreeParameter("valve.area"), INERTIA)
+    found = fitted(experiment, FLOW, FitNumber("valve.area"), INERTIA)
     assert [one.verdict for one in found.estimates] == ["not identifiable", "not identifiable", "identified"]
     assert "trades off against valves.proportional.area" in found.estimates[0].explanation
     product = found.values["valves.proportional.area"] * found.values["valves.proportional.discharge_coefficient"]
@@ -113,7 +113,7 @@ def test_a_number_that_does_nothing_is_not_identifiable_and_says_so(experiment: 
     # Chamber 2 would start at the pressure of its regulator; with a start of its own, it never meets that regulator.
     start = {"initial.pressure_2": experiment.scenario.initial.pressure_2}
     apart = dataclasses.replace(experiment, scenario=with_numbers(experiment.scenario, start))
-    found = fitted(apart, INERTIA, FreeParameter("supply.dorsiflexion_pressure"))
+    found = fitted(apart, INERTIA, FitNumber("supply.dorsiflexion_pressure"))
     assert found.estimate("supply.dorsiflexion_pressure").verdict == "not identifiable"
     said = "the recordings are hardly sensitive to this parameter"
     assert found.estimate("supply.dorsiflexion_pressure").explanation == said
@@ -121,7 +121,7 @@ def test_a_number_that_does_nothing_is_not_identifiable_and_says_so(experiment: 
 
 
 def test_a_bound_that_keeps_the_truth_out_is_named(experiment: FittedExperiment) -> None:
-    found = fitted(experiment, FLOW, FreeParameter("foot_plate.inertia", start=0.012, low=0.010, high=0.02))
+    found = fitted(experiment, FLOW, FitNumber("foot_plate.inertia", start=0.012, low=0.010, high=0.02))
     inertia = found.estimate("foot_plate.inertia")
     assert inertia.verdict == "at its bound"
     assert "at or beyond 0.01 kg m^2" in inertia.explanation
@@ -140,7 +140,7 @@ def test_a_model_that_lacks_something_holds_for_itself_only(experiment: FittedEx
 
 
 def test_a_prior_decides_where_the_recordings_are_silent(experiment: FittedExperiment) -> None:
-    found = fitted(experiment, FLOW, FreeParameter("valve.area", start=31.6e-6, deviation=0.316e-6))
+    found = fitted(experiment, FLOW, FitNumber("valve.area", start=31.6e-6, deviation=0.316e-6))
     area = found.estimate("valve.area")
     assert area.value == pytest.approx(31.6e-6, rel=1e-3)
     assert area.half_width == pytest.approx(0.0196 * area.value, rel=0.05)
@@ -149,7 +149,7 @@ def test_a_prior_decides_where_the_recordings_are_silent(experiment: FittedExper
 
 
 def test_an_initial_pressure_of_one_recording_is_found(experiment: FittedExperiment) -> None:
-    start = FreeParameter("initial.pressure_2", start=4.4e5, low=4.0e5, high=5.2e5, recordings=("step",))
+    start = FitNumber("initial.pressure_2", start=4.4e5, low=4.0e5, high=5.2e5, recordings=("step",))
     (estimate,) = fitted(experiment, start).estimates
     assert (estimate.path, estimate.unit) == ("initial.pressure_2 of step", "Pa")
     assert abs(estimate.value - experiment.scenario.initial.pressure_2) < 3.0 / 1.96 * estimate.half_width
@@ -167,7 +167,7 @@ def test_a_number_limited_to_one_recording_leaves_the_other_alone(
     second = FittedExperiment(
         "low", load_scenario("step-response", ["motion.kind=free", "run.duration=0.35 s", start]), recorded(low)
     )
-    supplies = tuple(FreeParameter("supply.pressure", recordings=(label,)) for label in ("step", "low"))
+    supplies = tuple(FitNumber("supply.pressure", recordings=(label,)) for label in ("step", "low"))
     found = fit(TrajectoryProblem(supplies, (experiment, second)))
     high, less = (estimate.value for estimate in found.estimates)
     assert high == pytest.approx(number_at(step, "supply.pressure"), rel=1e-3)
@@ -186,8 +186,7 @@ def test_a_fit_ends_at_the_same_numbers_from_several_starts(experiment: FittedEx
     lacking = ["motion.kind=free", "run.duration=0.35 s", "foot_plate.gravity_torque=0.4 N m"]
     scenario = experiment.scenario if is_right else load_scenario("step-response", lacking)
     fits = [
-        fitted(dataclasses.replace(experiment, scenario=scenario), *map(FreeParameter, paths, start))
-        for start in starts
+        fitted(dataclasses.replace(experiment, scenario=scenario), *map(FitNumber, paths, start)) for start in starts
     ]
     ends = np.array([[(one.value, one.low, one.high) for one in found.estimates] for found in fits])
     widths = (ends[:, :, 2] - ends[:, :, 1]).min(axis=0)
@@ -206,7 +205,7 @@ def test_a_cylinder_is_fitted_as_a_vane_is(recorded: Callable[..., Recording]) -
     path = "valve.sonic_conductance" if hasattr(scenario.device.valve.orifice, "sonic_conductance") else FLOW.path
     truth = number_at(scenario, path)
 
-    (estimate,) = fitted(experiment, FreeParameter(path, start=0.8 * truth)).estimates
+    (estimate,) = fitted(experiment, FitNumber(path, start=0.8 * truth)).estimates
 
     assert estimate.verdict == "identified"
     assert abs(estimate.value - truth) < 3.0 / 1.96 * estimate.half_width < 0.1 * truth

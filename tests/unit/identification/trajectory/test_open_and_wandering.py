@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
+from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.tolerances import Tolerances
 from ppafo.identification.trajectory.experiment import (
     FittedExperiment,
-    FreeParameter,
     TrajectoryProblem,
     stated_by,
     tolerance_parameters,
@@ -23,7 +23,7 @@ STEP = ("motion.kind=free", "run.duration=0.35 s")
 LEAK = 0.3e-6
 
 
-def fitted(experiment: FittedExperiment, *sought: FreeParameter) -> TrajectoryFit:
+def fitted(experiment: FittedExperiment, *sought: FitNumber) -> TrajectoryFit:
     stated = stated_by(load_parameter_set("ppafo2011"), experiment.scenario)
     tolerances = tolerance_parameters(Tolerances.model_construct(), (experiment,), sought, stated)
     return fit(TrajectoryProblem((*sought, *tolerances), (experiment,)))
@@ -33,8 +33,8 @@ def fitted(experiment: FittedExperiment, *sought: FreeParameter) -> TrajectoryFi
 def test_a_leak_beside_the_delay_of_a_valve_is_not_identifiable_and_its_interval_is_open(seed: int) -> None:
     scenario = load_scenario("step-response", STEP)
     recording = record("step-response", "paper-bench", seed, overrides=STEP).recording
-    delay = FreeParameter("valve.delay", start=2.0e-3, low=1.0e-4, high=2.0e-2)
-    sought = FreeParameter("valve.discharge_coefficient"), FreeParameter("actuator.leak.area"), delay
+    delay = FitNumber("valve.delay", start=2.0e-3, low=1.0e-4, high=2.0e-2)
+    sought = FitNumber("valve.discharge_coefficient"), FitNumber("actuator.leak.area"), delay
 
     found = fitted(FittedExperiment("step", scenario, recording), *sought)
 
@@ -56,7 +56,7 @@ def wandering_by(experiment: FittedExperiment, size: float) -> TrajectoryFit:
     moved = Channel(recording["pressure_1"] + size * level, "Pa")
     other = Recording(recording.label, recording.time, {**recording.channels, "pressure_1": moved}, recording.kind)
     found = dataclasses.replace(experiment, recording=other, noise={})
-    return fitted(found, FreeParameter("foot_plate.inertia"))
+    return fitted(found, FitNumber("foot_plate.inertia"))
 
 
 def test_what_wanders_by_more_than_the_zero_of_its_sensor_may_be_off_holds_for_this_model_only(
@@ -84,7 +84,7 @@ def test_samples_that_stand_out_are_left_out_and_said(experiment: FittedExperime
     values[[40, 200]] += np.array([4.0e4, -4.0e4])
     spoilt = dataclasses.replace(experiment, recording=recording.with_channel("pressure_2", values, "Pa"), noise={})
 
-    found = fitted(spoilt, FreeParameter("foot_plate.inertia"))
+    found = fitted(spoilt, FitNumber("foot_plate.inertia"))
 
     said = "experiment 'step': 2 outliers of pressure_2 left out, the first at 0.04 s"
     assert found.outliers == (said,)

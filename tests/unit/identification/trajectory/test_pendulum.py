@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
+from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.tolerances import Tolerances
 from ppafo.identification.trajectory.experiment import (
     FittedExperiment,
-    FreeParameter,
     TrajectoryProblem,
     tolerance_parameters,
     with_numbers,
@@ -69,25 +69,25 @@ def swing(tmp_path_factory: pytest.TempPathFactory) -> FittedExperiment:
     return FittedExperiment("swing", hanging, recording, channels=("angle",))
 
 
-def fitted(swing: FittedExperiment, *friction: FreeParameter) -> TrajectoryFit:
+def fitted(swing: FittedExperiment, *friction: FitNumber) -> TrajectoryFit:
     parameters = (
-        FreeParameter("foot_plate.inertia", 0.1, 0.01, 1.0),
-        FreeParameter("friction.viscous_damping", None, 0.0, 0.5),
+        FitNumber("foot_plate.inertia", 0.1, 0.01, 1.0),
+        FitNumber("friction.viscous_damping", math.nan, 0.0, 0.5),
         *friction,
     )
     tolerances = tolerance_parameters(Tolerances.model_construct(held=0.0), (swing,), parameters)
     return fit(TrajectoryProblem((*parameters, *tolerances), (swing,)))
 
 
-@pytest.mark.parametrize("starts", [(None, None), (0.10, 0.40)])
+@pytest.mark.parametrize("starts", [(math.nan, math.nan), (0.10, 0.40)])
 def test_bounds_of_friction_change_nothing_where_they_are_wide(
-    swing: FittedExperiment, starts: tuple[float | None, float | None]
+    swing: FittedExperiment, starts: tuple[float, float]
 ) -> None:
     dynamic, static = starts
     found = fitted(
         swing,
-        FreeParameter("friction.dynamic_torque", dynamic, **LOOSE),
-        FreeParameter("friction.static_torque", static, **LOOSE),
+        FitNumber("friction.dynamic_torque", dynamic, **LOOSE),
+        FitNumber("friction.static_torque", static, **LOOSE),
     )
     assert found.remarks == ()
     for estimate in found.estimates:
@@ -99,13 +99,13 @@ def test_bounds_of_friction_change_nothing_where_they_are_wide(
 
 
 def test_friction_at_rest_keeps_the_bounds_that_it_was_given(swing: FittedExperiment) -> None:
-    dynamic = FreeParameter("friction.dynamic_torque", **LOOSE)
-    static = fitted(swing, dynamic, FreeParameter("friction.static_torque", None, 0.25, 0.5)).estimates[3]
+    dynamic = FitNumber("friction.dynamic_torque", **LOOSE)
+    static = fitted(swing, dynamic, FitNumber("friction.static_torque", math.nan, 0.25, 0.5)).estimates[3]
     assert static.low == static.value == pytest.approx(0.25)
     assert not static.is_usable
 
 
 def test_bounds_without_any_friction_at_rest_above_that_in_motion_are_refused(swing: FittedExperiment) -> None:
-    dynamic = FreeParameter("friction.dynamic_torque", 0.3, 0.2, 0.5)
+    dynamic = FitNumber("friction.dynamic_torque", 0.3, 0.2, 0.5)
     with pytest.raises(IdentificationError, match=r"high = 0\.17 N m must be above low = 0\.2 N m"):
-        fitted(swing, dynamic, FreeParameter("friction.static_torque", 0.1, 0.0, 0.17))
+        fitted(swing, dynamic, FitNumber("friction.static_torque", 0.1, 0.0, 0.17))

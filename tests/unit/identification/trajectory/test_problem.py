@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
+from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.trajectory.experiment import (
     TIME_OFFSET,
     FittedExperiment,
-    FreeParameter,
     TrajectoryProblem,
     broken_rule,
     declared_numbers,
@@ -20,36 +20,35 @@ from ppafo.identification.trajectory.fitting import fit, prepare
 from ppafo.running import simulate
 from ppafo.simulation.scenario import Scenario
 
-INERTIA = FreeParameter("foot_plate.inertia")
+INERTIA = FitNumber("foot_plate.inertia")
 
 
-def problem(experiment: FittedExperiment, *parameters: FreeParameter) -> TrajectoryProblem:
+def problem(experiment: FittedExperiment, *parameters: FitNumber) -> TrajectoryProblem:
     return TrajectoryProblem(parameters, (experiment,))
 
 
 def test_bounds_and_scale_follow_from_the_declaration(experiment: FittedExperiment) -> None:
     inertia, friction, angle = numbers_of(
-        problem(experiment, INERTIA, FreeParameter("friction.static_torque"), FreeParameter("motion.angle"))
+        problem(experiment, INERTIA, FitNumber("friction.static_torque"), FitNumber("motion.angle"))
     )
-    assert (inertia.free.scale, inertia.free.low, inertia.free.high) == pytest.approx((8.4e-3, 8.4e-5, 0.84))
-    assert (friction.free.low, friction.unit) == (pytest.approx(0.0045), "N m")
-    assert (angle.free.low, angle.unit) == (-10.0, "rad")
+    assert (inertia.scale, inertia.low, inertia.high) == pytest.approx((8.4e-3, 8.4e-5, 0.84))
+    assert (friction.low, friction.unit) == (pytest.approx(0.0045), "N m")
+    assert (angle.low, angle.unit) == (-10.0, "rad")
 
 
 @pytest.mark.parametrize(
     ("parameter", "message"),
     [
-        (FreeParameter("foot_plate.inertia", low=1.0, high=2.0), "must lie between the bounds"),
-        (FreeParameter("foot_plate.inertia", high=5.0e3), "exceed the allowed range"),
-        (FreeParameter("actuator.torque_constant", start=0.0, low=0.0), "start = 0 needs bounds"),
-        (FreeParameter("foot_plate.inertia", start=float("nan")), "must be finite"),
-        (FreeParameter("foot_plate.inertia", deviation=0.0), "standard deviation of a prior"),
-        (FreeParameter("foot_plate.inertia", recordings=("stop",)), "did you mean 'step'"),
-        (FreeParameter("foot_plate.weight"), "'foot_plate.weight' cannot be fitted"),
+        (FitNumber("foot_plate.inertia", low=1.0, high=2.0), "must lie between the bounds"),
+        (FitNumber("foot_plate.inertia", high=5.0e3), "exceed the allowed range"),
+        (FitNumber("actuator.torque_constant", start=0.0, low=0.0), "start = 0 needs bounds"),
+        (FitNumber("foot_plate.inertia", deviation=0.0), "standard deviation of a prior"),
+        (FitNumber("foot_plate.inertia", recordings=("stop",)), "did you mean 'step'"),
+        (FitNumber("foot_plate.weight"), "'foot_plate.weight' cannot be fitted"),
     ],
 )
 def test_a_parameter_that_makes_no_sense_is_refused(
-    experiment: FittedExperiment, parameter: FreeParameter, message: str
+    experiment: FittedExperiment, parameter: FitNumber, message: str
 ) -> None:
     with pytest.raises(IdentificationError, match=message):
         problem(experiment, parameter)
@@ -74,17 +73,17 @@ def test_an_experiment_that_makes_no_sense_is_refused(
 
 def test_the_same_parameter_twice_is_refused(experiment: FittedExperiment) -> None:
     with pytest.raises(IdentificationError, match="given twice"):
-        problem(experiment, FreeParameter("valve.area"), FreeParameter("valves.proportional.area"))
+        problem(experiment, FitNumber("valve.area"), FitNumber("valves.proportional.area"))
 
 
 def test_every_parameter_that_0_leaves_out_of_the_model_is_refused_before_the_fit(experiment: FittedExperiment) -> None:
-    late, spool = FreeParameter("valve.delay"), FreeParameter("valve.spool_frequency", start=30.0, low=0.0)
+    late, spool = FitNumber("valve.delay"), FitNumber("valve.spool_frequency", start=30.0, low=0.0)
     words = r"0 leaves it out of the model, so it cannot be fitted from there; start and low must be above 0"
     with pytest.raises(
         IdentificationError, match=rf"\(1\) valve\.delay: {words}; \(2\) valve\.spool_frequency: {words}$"
     ):
         problem(experiment, late, INERTIA, spool)
-    problem(experiment, FreeParameter("valve.delay", start=0.015, low=0.001))
+    problem(experiment, FitNumber("valve.delay", start=0.015, low=0.001))
 
 
 def test_too_few_samples_after_the_start_are_refused(experiment: FittedExperiment) -> None:

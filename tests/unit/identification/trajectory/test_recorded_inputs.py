@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError, IdentificationError
-from ppafo.identification.trajectory.experiment import FittedExperiment, FreeParameter, TrajectoryProblem, numbers_of
+from ppafo.identification.least_squares import FitNumber
+from ppafo.identification.trajectory.experiment import FittedExperiment, TrajectoryProblem, numbers_of
 from ppafo.identification.trajectory.fitting import fit, prepare, signals_at, signals_of
 from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording
@@ -15,9 +16,9 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 
 NOISE = {"angle": 0.0017, "pressure_1": 500.0, "pressure_2": 500.0}
-FLOW = FreeParameter("valve.discharge_coefficient", start=0.10)
-INERTIA = FreeParameter("foot_plate.inertia", start=0.010)
-OFFSET = FreeParameter("recording.time_offset", recordings=("step",))
+FLOW = FitNumber("valve.discharge_coefficient", start=0.10)
+INERTIA = FitNumber("foot_plate.inertia", start=0.010)
+OFFSET = FitNumber("recording.time_offset", recordings=("step",))
 LATE = 3.4e-3
 
 
@@ -46,8 +47,8 @@ def test_a_recorded_command_gives_the_run_that_the_controller_made(controlled: t
     scenario, recording = controlled
     assert np.count_nonzero(np.diff(recording["command"])) > 100
     followed = FittedExperiment("task", scenario, recording, noise=NOISE, inputs=("command",))
-    numbers = numbers_of(TrajectoryProblem((FreeParameter("valve.discharge_coefficient"),), (followed,)))
-    (signals,) = signals_of([prepare(followed, {})], numbers, np.array([[numbers[0].free.start]]))
+    numbers = numbers_of(TrajectoryProblem((FitNumber("valve.discharge_coefficient"),), (followed,)))
+    (signals,) = signals_of([prepare(followed, {})], numbers, np.array([[numbers[0].start]]))
     assert signals["angle"][:, 0] == pytest.approx(recording["angle"], abs=1e-5)
     assert signals["pressure_1"][:, 0] == pytest.approx(recording["pressure_1"], rel=1e-5)
 
@@ -132,7 +133,7 @@ def test_the_same_recording_in_two_experiments_is_refused_and_two_parts_of_it_ar
 def test_a_supply_that_is_followed_cannot_be_fitted_too(experiment: FittedExperiment) -> None:
     followed = with_input(experiment, "supply_pressure", np.full(len(experiment.recording), 4.0e5), "Pa")
     with pytest.raises(IdentificationError, match="uses the recorded 'supply_pressure'"):
-        TrajectoryProblem((FreeParameter("supply.pressure"),), (followed,))
+        TrajectoryProblem((FitNumber("supply.pressure"),), (followed,))
 
 
 @pytest.mark.parametrize(

@@ -11,11 +11,11 @@ from scipy.signal import lfilter
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.documents.models import validate
 from ppafo.errors import IdentificationError
+from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.identification.trajectory import fitting as trajectory_runs
 from ppafo.identification.trajectory.experiment import (
     FittedExperiment,
-    FreeParameter,
     TrajectoryProblem,
     number_at,
     tolerance_parameters,
@@ -97,7 +97,7 @@ def test_friction_at_rest_may_last_in_a_motion_up_to_a_velocity_where_the_set_sa
     # A share that is held would make its error one of the static friction: it is a tolerance as every other number.
     assert (share.path, share.start) == ("effects.stribeck.share", 0.9)
     assert share.deviation == pytest.approx(0.3 * 0.9 / math.sqrt(3.0))
-    sought = FreeParameter("effects.stribeck.velocity", start=0.2)
+    sought = FitNumber("effects.stribeck.velocity", start=0.2)
     beside = [
         one.path
         for one in tolerance_parameters(Tolerances.model_construct(), (experiment,), (sought,))
@@ -143,7 +143,7 @@ def test_a_sensor_that_is_mounted_anew_has_a_zero_in_each_recording(experiment: 
 
 
 def test_what_is_fitted_anyway_gets_no_tolerance(experiment: FittedExperiment) -> None:
-    fitted = (FreeParameter("supply.pressure"), FreeParameter("valve.discharge_coefficient"))
+    fitted = (FitNumber("supply.pressure"), FitNumber("valve.discharge_coefficient"))
     paths = [item.path for item in tolerance_parameters(STATED, (experiment,), fitted)]
     assert not {"supply.pressure", "valves.proportional.discharge_coefficient"} & set(paths)
 
@@ -193,7 +193,7 @@ def test_errors_of_the_bench_hide_no_number_where_they_are_tolerances(recorded: 
         return FittedExperiment(scenario.name, scenario, replace(made, channels=channels))
 
     experiments = (on_bench(planned["there"], 5000.0, 1), on_bench(planned["low"], -5500.0, 2))
-    free = (FreeParameter("foot_plate.inertia", start=0.009), FreeParameter("friction.viscous_damping"))
+    free = (FitNumber("foot_plate.inertia", start=0.009), FitNumber("friction.viscous_damping"))
     inertia = number_at(planned["there"], "foot_plate.inertia")
 
     plain = fit(TrajectoryProblem(free, experiments))
@@ -229,7 +229,7 @@ def test_the_lag_of_a_filtered_sensor_is_no_dead_time_of_the_valve(path: str, la
         channels[name] = Channel(sensed, "Pa")
     start = truth if "delay" not in path else load_scenario("step-response", [*common, "valve.delay=10 ms"])
     experiment = FittedExperiment("one", start, Recording("filtered", time, channels), channels=tuple(channels))
-    sought = (FreeParameter(path),)
+    sought = (FitNumber(path),)
     problem = TrajectoryProblem(
         (*sought, *tolerance_parameters(Tolerances.model_construct(), [experiment], sought)), (experiment,)
     )
