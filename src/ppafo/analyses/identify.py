@@ -14,7 +14,7 @@ from ppafo.errors import IdentificationError, PpafoError, noted_in, raise_noted
 from ppafo.identification.estimate import WRONG_UNIT, Estimate
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report, report_nothing
-from ppafo.units.shown import counted_from, shown_in
+from ppafo.units.shown import counted_from, in_units, shown_in
 from ppafo.wording import count_of, percentage
 
 if TYPE_CHECKING:
@@ -56,6 +56,13 @@ class Identification:
     trajectory: TrajectoryFit | None
     before: ParameterSet
     new_set: NewSet
+
+    @property
+    def shown(self) -> dict[str, str]:
+        """Display units of the set before, by SI unit."""
+        from ppafo.parameters.parameter_set import atmospheric_pressure
+
+        return counted_from(self.before.shown, atmospheric_pressure(self.before))
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -226,8 +233,6 @@ class _RecordingReader(NamedTuple):
         from ppafo.storage.result_folder import RUN_FILE
 
         path, atmosphere = self.folder / name, atmospheric_pressure(self.parameter_set)
-        if path.is_dir():
-            raise IdentificationError(f"{path}: is a folder, not a recording; give the recording in the folder")
         if columns is None:
             is_text = path.suffix.lower() in TEXT_SUFFIXES and not (path.parent / RUN_FILE).exists()
             if row_time is not None and is_text:
@@ -411,38 +416,33 @@ def _described_set(identification: Identification, problem: ProblemFile) -> Para
     )
 
 
+@in_units(lambda identification: identification.shown)
 def finding_of(identification: Identification) -> Finding[Identification]:
     """Return an identification as a finding; passed if the recordings agree and the new set is valid and consistent."""
     from ppafo.parameters.loading import parameter_set_toml
-    from ppafo.parameters.parameter_set import atmospheric_pressure
     from ppafo.report.finding import Finding, Section
 
     name, new_set, before = identification.name, identification.new_set, identification.before
-    trajectory = identification.trajectory
-    with shown_in(counted_from(before.shown, atmospheric_pressure(before))):
-        parts = [
-            _part(
-                f"{result.procedure}{{}}: {result.summary}",
-                result,
-                [f"remark: {remark}" for remark in result.remarks],
-                before,
+    fit = identification.trajectory
+    parts = [
+        _part(
+            f"{result.procedure}{{}}: {result.summary}", result, [f"remark: {text}" for text in result.remarks], before
+        )
+        for result in identification.results
+    ]
+    if fit is not None:
+        more = [*_tolerances(fit.known, before), *(f"remark: {remark}" for remark in fit.notes)]
+        for number, item in enumerate(fit.expected, start=1):
+            fraction = 1.0 - item.shrinkage[item.most_helped]
+            more.append(
+                f"next experiment {number}: {item.label}: gain {item.gain:.2f}; largest for {item.most_helped}, "
+                f"whose interval would shrink by {fraction:.0%}"
             )
-            for result in identification.results
-        ]
-        if trajectory is not None:
-            fit = trajectory
-            more = [*_tolerances(fit.known, before), *(f"remark: {remark}" for remark in fit.notes)]
-            for number, item in enumerate(fit.expected, start=1):
-                fraction = 1.0 - item.shrinkage[item.most_helped]
-                more.append(
-                    f"next experiment {number}: {item.label}: gain {item.gain:.2f}; largest for {item.most_helped}, "
-                    f"whose interval would shrink by {fraction:.0%}"
-                )
-            heading = (
-                f"trajectory{{}}: {count_of(len(fit.estimates), 'number')} fitted to "
-                f"{count_of(len(fit.measurements), 'recording')}, {count_of(len(fit.known), 'tolerance')}"
-            )
-            parts.append(_part(heading, fit, more, before))
+        heading = (
+            f"trajectory{{}}: {count_of(len(fit.estimates), 'number')} fitted to "
+            f"{count_of(len(fit.measurements), 'recording')}, {count_of(len(fit.known), 'tolerance')}"
+        )
+        parts.append(_part(heading, fit, more, before))
     written, fitted = new_set.written, new_set.fitted
     # What holds for this model only is in the set as well, and is never counted with what is identified.
     # Other numbers may be identified too, such as the zero of a scale, for which a set has no place.
@@ -457,7 +457,7 @@ def finding_of(identification: Identification) -> Finding[Identification]:
             "were not fitted"
         )
     # As they are remarks among others, these that prevent a pass are repeated at the end.
-    of_fit = () if trajectory is None else trajectory.remarks
+    of_fit = () if fit is None else fit.remarks
     problem += [f"not passed (exit code 1): {remark}" for remark in of_fit]
     return Finding(
         name="identify",

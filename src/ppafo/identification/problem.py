@@ -7,15 +7,17 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from ppafo.documents.faults import line_of, refuse
 from ppafo.documents.models import Quantified, SchemaVersion, StrictTable, Text, Texts, make_schema, validate
-from ppafo.documents.toml_text import NAME, TomlKind, label
+from ppafo.documents.regular_file import decoded
+from ppafo.documents.toml_text import NAME, TomlKind, label, quote
 from ppafo.errors import IdentificationError
 from ppafo.identification.procedures import BenchProblem
 from ppafo.identification.tolerances import Columns, Confidence, Tolerances
 from ppafo.identification.trajectory.experiment import ALL_INPUTS
 from ppafo.simulation.recorded.channels import LONGEST_STEP
 from ppafo.storage.column_map import ColumnMap
-from ppafo.wording import known_names
+from ppafo.wording import known_names, nearest_name
 
 _Label = Annotated[
     str, Field(pattern=NAME, max_length=60, description="name of the experiment, also used in file names")
@@ -154,9 +156,27 @@ class ProblemFile(StrictTable):
 def load_problem(path: str | Path) -> ProblemFile:
     """Return the problem in a TOML file; its paths are relative to its folder.
 
-    Raises IdentificationError for an invalid file.
+    Raises IdentificationError for an invalid file, and for recordings that are not there.
     """
-    return parse_problem(_FILE.read(path), label(str(path)))
+    content, file, folder = _FILE.read(path), label(str(path)), Path(path).parent
+    problem = parse_problem(content, file)
+    named = {
+        f"procedure.{number}.recordings": item.recordings for number, item in enumerate(problem.procedure, start=1)
+    }
+    fitted = () if problem.trajectory is None else problem.trajectory.experiments
+    named |= {
+        f"trajectory.experiments.{number}.recording": (item.recording,) for number, item in enumerate(fitted, start=1)
+    }
+    gone = {
+        key: f"{key} = {quote(name)}: {'is a folder' if (folder / name).is_dir() else 'there is no such file'}"
+        f"{nearest_name(name, [item.name for item in folder.iterdir()])}"
+        for key, names in named.items()
+        for name in names
+        if not (folder / name).is_file()
+    }
+    if gone:
+        refuse(gone, file, IdentificationError, partial(line_of, decoded(content)))
+    return problem
 
 
 def parse_problem(content: bytes, file: str) -> ProblemFile:

@@ -120,7 +120,7 @@ def _in_unit(recording: Recording, names: Iterable[str], factor: float, atmosphe
 BenchProblem = StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | ValveMapProblem | VaneLeakProblem
 """Bench laws in the recommended order: each after those whose results it uses."""
 LAWS: dict[str, type[BenchLaw]] = {
-    get_args(law.model_fields["kind"].annotation)[0]: law for law in get_args(BenchProblem)
+    kind: law for law in get_args(BenchProblem) for kind in get_args(law.model_fields["kind"].annotation)
 }
 """Bench laws by kind, in the recommended order."""
 

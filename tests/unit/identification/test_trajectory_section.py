@@ -196,6 +196,8 @@ def test_what_the_new_set_keeps_beside_values_fitted_with_it_is_said(both: Ident
     said = "not passed (exit code 1): the new set keeps its own foot_plate.inertia, with which its other values were"
     assert said in text_of(inconsistent)
     assert finding_of(both).passed
+    # Also of the figures, which are drawn later.
+    assert finding_of(both).units == both.shown
     assert not inconsistent.passed
 
 
@@ -293,7 +295,10 @@ pressure_2 = { column = 4, unit = "Pa_a" }
         ("", "problem.toml: has neither a [[procedure]] nor a [trajectory]"),
         (FIT.replace("scenario =", "scenaro ="), "did you mean 'scenario'"),
         (FIT.replace('"step-response"', '"step-respons"'), "step-respons"),
-        (FIT.replace("step.csv", "nowhere.csv"), "nowhere.csv"),
+        (
+            FIT.replace("step.csv", "stop.csv"),
+            "problem.toml: line 15: trajectory.experiments.1.recording = 'stop.csv': there is no such file, did you",
+        ),
         (FIT.replace('"step"', '"Step 1"'), "trajectory.experiments.1.label"),
         (FIT.replace("foot_plate.inertia", "foot_plate.inertial"), "did you mean 'foot_plate.inertia'"),
         (FIT.replace("2 g m^2", "2 g m"), "parameter 'foot_plate.inertia': low = '2 g m': unit 'g m' does not fit"),

@@ -300,10 +300,13 @@ class LawFit(NamedTuple):
 
 
 class VaneLeakProblem(FlowLaw, TimedLaw):
-    """Table of procedure vane-leak: area, conductance or laminar coefficient from decaying pressure or steady flow."""
+    """Table of procedure vane-leak: area, conductance or laminar coefficient from decaying pressure or steady flow.
+
+    Of ``vane-leak-steady`` the recordings are of steady flow, as those of the experiment of the bench.
+    """
 
     needed = CHANNELS
-    kind: Literal["vane-leak"]
+    kind: Literal["vane-leak", "vane-leak-steady"]
     angle: Annotated[float, Quantified("rad")] | None = Field(
         None, description="vane angle, from which the set's volumes follow"
     )
@@ -368,7 +371,7 @@ class VaneLeakProblem(FlowLaw, TimedLaw):
             known_ratio = None if each == "iso6358" else critical_ratio
             size = size_of("leak", "actuator.leak", form, known_ratio, of_set)
             laws.append(Opening(gas, form, discharge_coefficient or PRODUCT_ONLY, known_ratio, size, _GAP))
-        if all("mass_flow" in source.recording for source in sources):
+        if self.kind == "vane-leak-steady" or all("mass_flow" in source.recording for source in sources):
             result = _steady_leak(sources, laws, context.tolerances, self.confidence)
         else:
             window = self.start, self.end

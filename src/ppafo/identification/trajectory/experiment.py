@@ -103,6 +103,11 @@ deviations, and least value as a fraction of the limit [-].
 
 At the least value the fall of the friction is practically abrupt; at 0 the effect would be off.
 """
+_WINDOWS = 8, 12, 16, 24, 32, 48, 64
+"""Numbers of first samples from which the velocity of a start in motion is found."""
+_FOLLOWED, _SURE, _SEEN, _LEAST_VELOCITY = 1.3, 2.0, 4.0, 0.05
+"""Scatter up to which a cubic follows the samples [noises], factor of the error of its velocity, for the cubic is none
+of the model, and least velocity of a motion: in such errors [-], and beyond them [rad/s]."""
 _START_OF_ANGLE = math.radians(0.05)
 """Standard deviation of an initial angle read from a recording [rad]."""
 
@@ -128,6 +133,11 @@ class FittedExperiment:
     inputs: tuple[str, ...] = ()
     initial_state: InitialState = "scenario"
     source: str = ""
+
+    @property
+    def is_read(self) -> bool:
+        """True if the run starts from the recorded state."""
+        return self.initial_state == "recording" or self.scenario.controller.is_outside
 
 
 def check_experiment(experiment: FittedExperiment) -> None:
@@ -196,7 +206,7 @@ def scenario_of(experiment: FittedExperiment) -> Scenario:
         angle = np.interp([experiment.start], recording.time, recording[ANGLE])
         scenario = replace(scenario, motion=FreeMotion(float(between_stops(angle, scenario.device, where)[0])))
     if experiment.initial_state == "scenario":
-        return scenario
+        return _moving(experiment, scenario)
     before = recording.time <= experiment.start + _FITS
     if not before.any():
         raise IdentificationError(
@@ -210,7 +220,40 @@ def scenario_of(experiment: FittedExperiment) -> Scenario:
     if ANGLE in rest and ANGLE not in experiment.inputs and isinstance(scenario.motion, FreeMotion):
         start = float(between_stops(np.array([rest[ANGLE]]), scenario.device, where)[0])
         scenario = replace(scenario, motion=replace(scenario.motion, angle=start))
-    return scenario
+    return _moving(experiment, scenario)
+
+
+def _moving(experiment: FittedExperiment, scenario: Scenario) -> Scenario:
+    """Return the scenario with the angular velocity at the start, if it begins in motion."""
+    if not isinstance(scenario.motion, FreeMotion) or (start := motion_at_start(experiment)) is None:
+        return scenario
+    angle, velocity, _ = start
+    where = f"experiment '{experiment.label}'"
+    angle = float(between_stops(np.array([angle]), scenario.device, where)[0])
+    return replace(scenario, motion=replace(scenario.motion, angle=angle, angular_velocity=velocity))
+
+
+def motion_at_start(experiment: FittedExperiment) -> tuple[float, float, float] | None:
+    """Return angle [rad], angular velocity and its standard error [rad/s] of a recorded start; None if it is at rest.
+
+    They are those of a cubic through the first samples, as many as it follows to their noise. A recorded velocity says
+    more.
+    """
+    recording = experiment.recording
+    names = recording.names
+    if not experiment.is_read or ANGLE in experiment.inputs or ANGLE not in names or "angular_velocity" in names:
+        return None
+    inside = recording.time >= experiment.start - _FITS
+    time, angles = recording.time[inside] - experiment.start, recording[ANGLE][inside]
+    noise, found = _read_error(recording, ANGLE), None
+    for count in (count for count in _WINDOWS if count <= time.size):
+        coefficients, covariance = np.polyfit(time[:count], angles[:count], 3, cov="unscaled")
+        scatter = float(np.std(angles[:count] - np.polyval(coefficients, time[:count])))
+        if found is not None and scatter > _FOLLOWED * noise:
+            break
+        angle, velocity = float(coefficients[3]), float(coefficients[2])
+        found = angle, velocity, _SURE * max(noise, scatter) * math.sqrt(float(covariance[2, 2]))
+    return found if found is not None and abs(found[1]) > _LEAST_VELOCITY + _SEEN * found[2] else None
 
 
 def use_of(experiment: FittedExperiment) -> UsedRecording:
@@ -506,7 +549,7 @@ def _of_run(tolerances: Tolerances, experiment: FittedExperiment) -> dict[str, t
         found["supply.pressure"] = deviation_of_limit(tolerances.supply)
         if DORSIFLEXION_SUPPLY not in inputs:
             found["supply.dorsiflexion_pressure"] = deviation_of_limit(tolerances.supply)
-    is_read = experiment.initial_state == "recording" or experiment.scenario.controller.is_outside
+    is_read = experiment.is_read
     stops = scenario.device.actuator.angle_min, scenario.device.actuator.angle_max
     # Where the vane lies at a stop, the stop says where it starts.
     if free is not None and ANGLE not in inputs and not any(math.isclose(free.angle, stop) for stop in stops):
@@ -515,6 +558,9 @@ def _of_run(tolerances: Tolerances, experiment: FittedExperiment) -> dict[str, t
         # The angle of a scenario was set by a sensor, whose zero is known to this limit.
         usual = read or deviation_of_limit(tolerances.zero_of_angle)
         found["motion.angle"] = usual if stated is None else deviation_of_limit(stated)
+    if isinstance(scenario.motion, FreeMotion) and (start := motion_at_start(experiment)) is not None:
+        found["motion.angular_velocity"] = start[2]
+        found.setdefault("motion.angle", math.hypot(_START_OF_ANGLE, _read_error(recording, ANGLE)))
     for name in ("pressure_1", "pressure_2"):
         noise = _read_error(recording, name) if is_read else 0.0
         stated = tolerances.start_of_pressure

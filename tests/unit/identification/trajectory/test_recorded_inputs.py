@@ -8,7 +8,13 @@ import pytest
 
 from ppafo.errors import DataError, IdentificationError
 from ppafo.identification.least_squares import FitNumber
-from ppafo.identification.trajectory.experiment import FittedExperiment, TrajectoryProblem, numbers_of
+from ppafo.identification.tolerances import DEFAULTS
+from ppafo.identification.trajectory.experiment import (
+    FittedExperiment,
+    TrajectoryProblem,
+    numbers_of,
+    tolerance_parameters,
+)
 from ppafo.identification.trajectory.fitting import fit, prepare, signals_at, signals_of
 from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording
@@ -158,6 +164,24 @@ def test_a_gap_in_an_input_is_refused(experiment: FittedExperiment) -> None:
     broken = dataclasses.replace(whole, recording=dataclasses.replace(whole.recording, time=time))
     with pytest.raises(DataError, match=r"experiment 'step': there is a gap of 0\.201 s"):
         TrajectoryProblem((INERTIA,), (broken,))
+
+
+@pytest.mark.parametrize("off", [1.8, 1.0 / 1.8])
+def test_a_recording_that_begins_in_motion_gives_the_velocity_at_its_start(
+    experiment: FittedExperiment, off: float
+) -> None:
+    recording = experiment.recording
+    speed = np.gradient(recording["angle"], recording.time)
+    start = float(recording.time[int(np.argmax(speed > 0.5 * speed.max())) + 5])
+    cut = dataclasses.replace(
+        experiment, recording=recording.between(start, 0.35), start=start, initial_state="recording"
+    )
+    sought = (FitNumber("foot_plate.inertia", off * 0.0084, 0.001, 0.1),)
+    found = fit(TrajectoryProblem((*sought, *tolerance_parameters(DEFAULTS, [cut], sought)), (cut,)))
+    (inertia,) = found.estimates
+    assert inertia.is_identified
+    assert inertia.low <= 0.0084 <= inertia.high
+    assert inertia.half_width < 0.2 * inertia.value
 
 
 def test_a_late_trigger_is_found_and_leaves_the_other_numbers_alone(late: FittedExperiment) -> None:
