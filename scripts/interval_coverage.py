@@ -185,7 +185,7 @@ def of_model(kind: str, random: np.random.Generator, supply_error: float = 0.0) 
             truth[place] = SOUGHT[item.path.replace("valves.proportional.", "valve.")]
     prepared = [prepare(one, numbers_in(one.label, numbers, truth)) for one in problem.experiments]
     return tuple(
-        noisy(Recording(one.label, one.time, {name: Channel(column[:, 0], clean[0].unit(name))
+        noisy(Recording(one.measured.label, one.measured.time, {name: Channel(column[:, 0], clean[0].unit(name))
                                              for name, column in signals.items()}, "synthetic"), kind, random)
         for one, signals in zip(prepared, signals_of(prepared, numbers, truth[:, None]), strict=True)
     )  # fmt: skip

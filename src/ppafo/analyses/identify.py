@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from ppafo.arguments import Word, checked
 from ppafo.errors import IdentificationError, PpafoError, noted_in, raise_noted
-from ppafo.identification.estimate import WRONG_UNIT, Estimate
+from ppafo.identification.estimate import Estimate, Identified
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report, report_nothing
 from ppafo.units.shown import counted_from, in_units, shown_in
@@ -65,18 +65,19 @@ class Identification:
         return counted_from(self.before.shown, atmospheric_pressure(self.before))
 
     @property
+    def parts(self) -> tuple[Identified, ...]:
+        """Results of all procedures, followed by that of the trajectory fit."""
+        return (*self.results, *(() if self.trajectory is None else (self.trajectory,)))
+
+    @property
     def estimates(self) -> tuple[Estimate, ...]:
         """Estimates of all procedures, followed by the estimates of the trajectory fit."""
-        fitted = () if self.trajectory is None else self.trajectory.estimates
-        return (*(estimate for result in self.results for estimate in result.estimates), *fitted)
+        return tuple(estimate for part in self.parts for estimate in part.estimates)
 
     @property
     def is_good(self) -> bool:
         """True if the recordings agree, no unit is probably wrong, and the new set is a valid, consistent device."""
-        is_fitted = self.trajectory is None or self.trajectory.is_good
-        is_fitted &= all(estimate.verdict != WRONG_UNIT for estimate in self.estimates)
-        is_valid = not self.new_set.problem and not self.kept_beside_fitted
-        return is_fitted and is_valid and not any(result.conflict for result in self.results)
+        return not self.new_set.problem and not self.kept_beside_fitted and all(part.is_good for part in self.parts)
 
     @property
     def kept_beside_fitted(self) -> list[str]:
@@ -100,30 +101,26 @@ class Identification:
         """Common origin of all recordings: measured, simulated or synthetic."""
         from ppafo.identification.source import kind_of
 
-        parts = [*self.results, *(() if self.trajectory is None else (self.trajectory,))]
-        return kind_of(part.kind for part in parts)
+        return kind_of(part.kind for part in self.parts)
 
     def json_document(self) -> dict[str, Any]:
         """Return estimates, checks and the new set as plain data in SI; rows of matrices follow the estimates."""
         from ppafo.documents.json_text import fields_of, plain
 
-        def estimates_of(part: BenchResult | TrajectoryFit) -> list[dict[str, Any]]:
-            return [plain(item) | {"verdict_text": item.verdict_text} for item in part.estimates]
-
-        procedures = [
+        parts = [
             {
-                **fields_of(result, "procedure", "summary", "conflict"),
-                "recordings_are": result.kind,
-                "estimates": estimates_of(result),
-                "remarks": list(result.remarks),
+                **fields_of(part, "procedure", "summary", "conflict"),
+                "recordings_are": part.kind,
+                "estimates": [plain(item) | {"verdict_text": item.verdict_text} for item in part.estimates],
+                "remarks": list(part.remarks),
             }
-            for result in self.results
+            for part in self.parts
         ]
         document = {
             "problem": self.name,
             "started_from": self.before.name,
             "is_good": self.is_good,
-            "procedures": procedures,
+            "procedures": parts[: len(self.results)],
             "new_set": {
                 "file": f"{self.name}.toml",
                 "identified": list(self.new_set.written),
@@ -147,18 +144,16 @@ class Identification:
             for experiment, measurement in zip(fit.problem.experiments, fit.measurements, strict=True)
         ]
         document["trajectory"] = {
-            "recordings_are": fit.kind,
+            **parts[-1],
             "recordings": recordings,
             "confidence": fit.problem.confidence,
             **fields_of(fit.fit, "evaluations", "has_converged"),
-            "estimates": estimates_of(fit),
             "covariance": fit.covariance.tolist(),
             "correlation": fit.correlation.tolist(),
             "tolerances": [plain(tolerance) for tolerance in fit.known],
             "channels": [plain(channel) for channel in fit.channels],
             "conflict": None if fit.fit.conflict is None else plain(fit.fit.conflict),
             "not_identifiable": [dict(combination) for combination in fit.fit.unidentified],
-            "remarks": list(fit.notes),
             "next_experiments": [plain(experiment) for experiment in fit.expected],
         }
         return document
@@ -351,20 +346,18 @@ def _used_recordings(tasks: Sequence[_Task], file: str) -> tuple[UsedRecording, 
     """
     from ppafo.identification.source import UsedRecording, double_use
 
-    by_procedure: dict[str, list[UsedRecording]] = {}
+    used = list[UsedRecording]()
     for task in tasks:
         kind = task.procedure.kind
         # Steady readings have no times: each counts by itself.
         first, last = (getattr(task.procedure, name, None) for name in ("start", "end"))
-        ends = -math.inf if first is None else first, math.inf if last is None else last
+        window = -math.inf if first is None else first, math.inf if last is None else last
         for number, source in enumerate(task.sources, start=1):
             name = f"recording {number} of procedure {kind}"
-            used = UsedRecording(name, source.trace, source.recording, frozenset(), *ends)
-            by_procedure.setdefault(kind, []).append(used)
-    for recordings in by_procedure.values():
-        if used_twice := double_use(recordings):
-            raise IdentificationError(f"{file}: {used_twice}")
-    return tuple(used for recordings in by_procedure.values() for used in recordings)
+            used.append(UsedRecording(name, source.trace, source.recording, frozenset(), *window, kind))
+    if used_twice := double_use(used):
+        raise IdentificationError(f"{file}: {used_twice}")
+    return tuple(used)
 
 
 def _described_set(identification: Identification, problem: ProblemFile) -> ParameterSet:
@@ -424,25 +417,16 @@ def finding_of(identification: Identification) -> Finding[Identification]:
 
     name, new_set, before = identification.name, identification.new_set, identification.before
     fit = identification.trajectory
-    parts = [
-        _part(
-            f"{result.procedure}{{}}: {result.summary}", result, [f"remark: {text}" for text in result.remarks], before
-        )
-        for result in identification.results
-    ]
+    parts, more = [_part(result, (), before) for result in identification.results], list[str]()
     if fit is not None:
-        more = [*_tolerances(fit.known, before), *(f"remark: {remark}" for remark in fit.notes)]
         for number, item in enumerate(fit.expected, start=1):
             fraction = 1.0 - item.shrinkage[item.most_helped]
             more.append(
                 f"next experiment {number}: {item.label}: gain {item.gain:.2f}; largest for {item.most_helped}, "
                 f"whose interval would shrink by {fraction:.0%}"
             )
-        heading = (
-            f"trajectory{{}}: {count_of(len(fit.estimates), 'number')} fitted to "
-            f"{count_of(len(fit.measurements), 'recording')}, {count_of(len(fit.known), 'tolerance')}"
-        )
-        parts.append(_part(heading, fit, more, before))
+        shown = _part(fit, _tolerances(fit.known, before), before)
+        parts.append(replace(shown, remarks=[*shown.remarks, *more]))
     written, fitted = new_set.written, new_set.fitted
     # What holds for this model only is in the set as well, and is never counted with what is identified.
     # Other numbers may be identified too, such as the zero of a scale, for which a set has no place.
@@ -457,8 +441,7 @@ def finding_of(identification: Identification) -> Finding[Identification]:
             "were not fitted"
         )
     # As they are remarks among others, these that prevent a pass are repeated at the end.
-    of_fit = () if fit is None else fit.remarks
-    problem += [f"not passed (exit code 1): {remark}" for remark in of_fit]
+    problem += [f"not passed (exit code 1): {fault}" for part in identification.parts for fault in part.faults]
     return Finding(
         name="identify",
         kicker="Identification",
@@ -473,11 +456,8 @@ def finding_of(identification: Identification) -> Finding[Identification]:
     )
 
 
-def _part(heading: str, part: BenchResult | TrajectoryFit, more: Iterable[str], before: ParameterSet) -> Section:
-    """Return the section of a procedure or of the fit: its estimates in the units of the set, and its remarks.
-
-    In ``heading``, {} becomes the origin of recordings that were not measured; ``more`` are sentences that follow.
-    """
+def _part(part: Identified, tolerances: Iterable[str], before: ParameterSet) -> Section:
+    """Return the section of a procedure or of the fit: its estimates in the units of the set, and its remarks."""
     from ppafo.identification.estimate import interval_texts
     from ppafo.identification.new_set import in_set_unit
     from ppafo.report.finding import Section, columns_of
@@ -504,7 +484,8 @@ def _part(heading: str, part: BenchResult | TrajectoryFit, more: Iterable[str], 
             times = f"{ratio:.3g} times the value of the set, {entry.value:.4g} {unit}".rstrip()
             far.append(f"remark: {item.path} is {times}")
     origin = "" if part.kind == "measured" else f" ({part.kind})"
-    return Section(heading.replace("{}", origin, 1), columns_of(("",) * 4, rows), remarks=[*said, *far, *more])
+    remarks = [*said, *far, *tolerances, *(f"remark: {remark}" for remark in part.remarks)]
+    return Section(f"{part.procedure}{origin}: {part.summary}", columns_of(("",) * 4, rows), remarks=remarks)
 
 
 def _tolerances(known: Sequence[NuisanceParameter], before: ParameterSet) -> list[str]:

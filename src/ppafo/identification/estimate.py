@@ -4,11 +4,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from statistics import NormalDist
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from ppafo.units import split_pressure_kind
 from ppafo.units.shown import shown_unit, shown_value
 from ppafo.wording import percentage
+
+if TYPE_CHECKING:
+    from ppafo.signals import RecordingKind
 
 _DIFFERENCES = {"Pa": "Pa_d"}
 """Unit of a difference by SI unit."""
@@ -148,3 +151,36 @@ class Estimate:
     def wider_half_width(self) -> float:
         """Width [``unit``] of the wider side of the interval; a side cut off at zero is too narrow."""
         return max(self.high - self.value, self.value - self.low)
+
+
+@dataclass(frozen=True, slots=True)
+class Identified:
+    """Result of a bench procedure or of the trajectory fit, named in a report by ``procedure`` and ``summary``.
+
+    ``kind``: origin of the recordings, which figures state unless measured. ``conflict``: sentence on readings that the
+    model does not explain, empty if it explains all. ``remarks``: sentences for a report, of which the ``faults``, on
+    the result as a whole, prevent a pass.
+    """
+
+    procedure: str
+    summary: str
+    estimates: tuple[Estimate, ...]
+    kind: "RecordingKind"
+    conflict: str = ""
+    remarks: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
+
+    @property
+    def is_good(self) -> bool:
+        """True if the recordings agree with the model and each other, and no unit is probably wrong."""
+        wrong_unit = any(estimate.verdict == WRONG_UNIT for estimate in self.estimates)
+        return not (self.conflict or self.faults or wrong_unit)
+
+    def __getitem__(self, path: str) -> Estimate:
+        """Return the estimate at a path. Raises KeyError if there is none."""
+        return {estimate.path: estimate for estimate in self.estimates}[path]
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Estimated values by path [SI]."""
+        return {estimate.path: estimate.value for estimate in self.estimates}

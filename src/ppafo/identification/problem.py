@@ -22,12 +22,19 @@ from ppafo.wording import known_names, nearest_name
 _Label = Annotated[
     str, Field(pattern=NAME, max_length=60, description="name of the experiment, also used in file names")
 ]
-_Noise = dict[str, Text]
 SHORTEST_STEP = 1.0e-6
 """Shortest time step that a problem file may request [s]."""
 _FILE = TomlKind(
     "identification problem", "identification", resources.files("ppafo.identification"), IdentificationError
 )
+
+
+class NoiseSection(StrictTable):
+    """Standard deviations of the noise by channel."""
+
+    angle: Annotated[float, Quantified("rad", above=0.0)] | None = None
+    pressure_1: Annotated[float, Quantified("Pa_d", above=0.0)] | None = None
+    pressure_2: Annotated[float, Quantified("Pa_d", above=0.0)] | None = None
 
 
 class PriorSection(StrictTable):
@@ -73,7 +80,9 @@ class ExperimentSection(StrictTable):
     channels: Texts | None = Field(
         None, description="compared channels; default: angle and pressures, unless locked or prescribed"
     )
-    noise: _Noise = Field({}, description="least standard deviation by channel, '0.1 deg', '500 Pa_d'; default: none")
+    noise: NoiseSection = Field(
+        NoiseSection(), description="least standard deviation by channel, '0.1 deg', '500 Pa_d'; default: none"
+    )
     inputs: Texts | None = Field(
         None, description=f"recorded channels used as inputs of the run: {', '.join(ALL_INPUTS)}"
     )
@@ -98,7 +107,7 @@ class CandidateSection(StrictTable):
     label: _Label
     scenario: Text = Field(description="name of a scenario, or a file relative to this one")
     overrides: Texts = Field((), description="changes to the scenario")
-    noise: _Noise = Field({}, description="by channel; default: what the fit finds")
+    noise: NoiseSection = Field(NoiseSection(), description="by channel; default: what the fit finds")
     interval: Annotated[float, Quantified("s", SHORTEST_STEP)] = Field(
         default_factory=lambda: 1.0e-3, description="time between two samples; default 1 ms"
     )

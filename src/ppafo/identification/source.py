@@ -1,9 +1,10 @@
 """Recordings as sources of estimates: file hash, check for double use, origin, remarks on readings."""
 
 import hashlib
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import combinations, product
+from itertools import combinations
 from pathlib import Path
 from typing import NoReturn
 
@@ -72,32 +73,32 @@ class UsedRecording:
     """Recording as used by a procedure or a fit.
 
     ``by`` names the user in messages, ``trace`` the file; ``channels`` are the channels used (empty for all), from
-    ``first`` to ``last`` [s].
+    ``first`` to ``last`` [s]. Users of two different procedures (``kind``) may share a recording.
     """
 
     by: str
     trace: str
     recording: Recording
-    channels: frozenset[str]
-    first: float
-    last: float
+    channels: frozenset[str] = frozenset()
+    first: float = -math.inf
+    last: float = math.inf
+    kind: str = ""
 
     def overlaps(self, other: "UsedRecording") -> bool:
         """Return whether two uses of the same recording share samples of a channel."""
+        if self.kind and other.kind and self.kind != other.kind:
+            return False
         is_alike = not (self.channels and other.channels) or bool(self.channels & other.channels)
         return is_alike and self.first < other.last and other.first < self.last
 
 
-def double_use(uses: Iterable[UsedRecording], others: Iterable[UsedRecording] | None = None) -> str:
-    """Return a message on samples used twice, among ``uses`` or between ``uses`` and ``others``; empty if none are.
+def double_use(uses: Iterable[UsedRecording]) -> str:
+    """Return a message on samples used twice; empty if none are.
 
     Recordings are compared by the hash of their numbers, independent of file names.
     """
     digests = [(use, _digest(use.recording)) for use in uses]
-    pairs: Iterable[tuple[tuple[UsedRecording, str], tuple[UsedRecording, str]]] = combinations(digests, 2)
-    if others is not None:
-        pairs = product(digests, [(use, _digest(use.recording)) for use in others])
-    for (use, digest), (other, other_digest) in pairs:
+    for (use, digest), (other, other_digest) in combinations(digests, 2):
         if digest == other_digest and use.overlaps(other):
             return (
                 f"{use.by} ({use.trace}) and {other.by} ({other.trace}) are the same recording (SHA-256 "

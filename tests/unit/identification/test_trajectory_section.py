@@ -112,13 +112,13 @@ def test_planted_values_are_found_from_a_scenario_and_from_a_recording_without_o
             # Three standard errors: 3/1.96 half widths.
             assert abs(estimate.value - truth[estimate.path]) < 3.0 / 1.96 * estimate.half_width
     assert both.is_good
-    assert both.trajectory.notes == ()
+    assert both.trajectory.remarks == ()
 
 
 def test_a_remark_that_prevents_a_pass_is_the_last_line(both: Identification) -> None:
     assert both.trajectory is not None
     assert "exit code 1" not in text_of(finding_of(both))
-    told = finding_of(replace(both, trajectory=replace(both.trajectory, remarks=("the search stopped",))))
+    told = finding_of(replace(both, trajectory=replace(both.trajectory, faults=("the search stopped",))))
     assert not told.passed
     assert text_of(told).splitlines()[-1] == "not passed (exit code 1): the search stopped"
 
@@ -250,7 +250,7 @@ def test_a_fit_that_contradicts_the_bench_says_so(solve: Solve) -> None:
     assert not bench.low <= truth <= bench.high
     assert any(
         "friction.viscous_damping: fitted " in remark and ", bench procedure " in remark
-        for remark in outcome.trajectory.notes
+        for remark in outcome.trajectory.remarks
     )
 
 
@@ -315,7 +315,7 @@ pressure_2 = { column = 4, unit = "Pa_a" }
         (f"{FIT}channels = ['torque']\n", "channel 'torque' cannot be fitted"),
         (
             f"{FIT}noise = {{ angel = '1 deg' }}\n",
-            "noise.angel: channel 'angel' cannot be fitted, did you mean 'angle'",
+            "unknown key 'trajectory.experiments.1.noise.angel', did you mean 'angle'",
         ),
         (f"{FIT}time_offset = '0 s'\n", "trajectory.experiments.1.time_offset = '0 s': must be above 0 s"),
         (f"{FIT}time_offset = '5 mm'\n", "time_offset = '5 mm': unit 'mm' does not fit"),
@@ -454,10 +454,10 @@ def test_a_recording_of_a_bench_procedure_that_is_fitted_too_is_refused(
 
 def test_other_times_of_a_recording_of_a_bench_procedure_may_be_fitted() -> None:
     recording = Recording("decay", np.arange(10.0), {"angle": Channel(np.arange(10.0), "rad")})
-    bench = UsedRecording("procedure", "decay.csv", recording, frozenset(), -np.inf, 4.0)
+    bench = UsedRecording("procedure", "decay.csv", recording, last=4.0)
     fitted = UsedRecording("experiment", "copy.csv", recording, frozenset({"angle"}), 4.0, 9.0)
-    assert double_use([bench], [fitted]) == ""
-    assert "would count twice" in double_use([bench], [replace(fitted, first=3.0)])
+    assert double_use([bench, fitted]) == ""
+    assert "would count twice" in double_use([bench, replace(fitted, first=3.0)])
 
 
 def test_a_recording_in_two_experiments_is_refused(solve: Solve) -> None:

@@ -98,7 +98,7 @@ def test_an_accusation_is_not_hidden_by_another_unit_that_scatters_less() -> Non
         value, scatter = {1.0: (1.64, 0.05), 0.069: (0.113, 0.05), 0.145: (9.0, 0.001)}.get(factor, (5.0, 0.05))
         path = "valves.proportional.discharge_coefficient"
         estimate = Estimate(path, value, "-", value, value, "identified", "", ())
-        return BenchResult("open-valve-flow", "", (estimate,), (), "measured", scatter=scatter)
+        return BenchResult("open-valve-flow", "", (estimate,), "measured", scatter=scatter)
 
     result = with_tried_units(run((source,)), (source,), BenchContext(load_parameter_set("ppafo2011"), "", ""), run)
     assert result.estimates[0].verdict == "unit probably wrong"

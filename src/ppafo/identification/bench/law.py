@@ -12,7 +12,7 @@ from pydantic import Field
 
 from ppafo.documents.models import Quantified, StrictTable, Text
 from ppafo.errors import IdentificationError
-from ppafo.identification.estimate import Estimate
+from ppafo.identification.estimate import Identified
 from ppafo.identification.fit import Fit, conflict_in_words, estimate_of, fit, wrong_shape
 from ppafo.identification.least_squares import FitNumber, ResidualBlock
 from ppafo.identification.new_set import stated_half_width
@@ -43,29 +43,15 @@ _WIDEST = 12.0
 
 
 @dataclass(frozen=True, slots=True)
-class BenchResult:
-    """Result of a bench procedure.
+class BenchResult(Identified):
+    """Result of a bench procedure, with its panels.
 
-    ``kind``: origin of the recordings, which figures state unless measured. ``conflict``: sentence on readings whose
-    separate estimates differ from the common estimates, empty if all agree. ``scatter``: standard deviation of the
-    readings from the model, divided by the largest reading [-]; nan where the procedure does not state it.
+    ``scatter``: standard deviation of the readings from the model, divided by the largest reading [-]; nan where the
+    procedure does not state it.
     """
 
-    procedure: str
-    summary: str
-    estimates: tuple[Estimate, ...]
-    panels: tuple[Panel, ...]
-    kind: RecordingKind
-    conflict: str = ""
-    remarks: tuple[str, ...] = ()
+    panels: tuple[Panel, ...] = ()
     scatter: float = math.nan
-
-    def __getitem__(self, path: str) -> Estimate:
-        """Return the estimate at a path. Raises KeyError if the procedure did not estimate it."""
-        for estimate in self.estimates:
-            if estimate.path == path:
-                return estimate
-        raise KeyError(path)
 
     def for_this_model_only(self, conflict: str) -> "BenchResult":
         """Return the result with a conflict, as a sentence, in which no value counts as identified."""

@@ -167,10 +167,6 @@ def check_experiment(experiment: FittedExperiment) -> None:
         (is_python, "a Python controller cannot be fitted; use a controller kind of the catalogue"),
         (has_torque and is_prescribed, "the angle is prescribed, so that a torque does nothing; remove it from inputs"),
         (has_torque and motion.leg is not None, "the leg prescribes T_ex; remove it from inputs, or free the motion"),
-        *(
-            (not 0.0 < deviation < math.inf, f"the noise of '{name}' must be above 0, not {deviation!r}")
-            for name, deviation in experiment.noise.items()
-        ),
     )
     if COMMAND in inputs:
         check_command(recording, where)

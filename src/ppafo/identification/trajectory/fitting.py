@@ -13,7 +13,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from ppafo.engine.lanes import run_batch
@@ -23,14 +22,13 @@ from ppafo.engine.run import NEVER_FAILED, Run, batches_of, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError, refused_as
-from ppafo.identification.estimate import Estimate, in_shown_unit
+from ppafo.identification.estimate import Estimate, Identified, in_shown_unit
 from ppafo.identification.fit import Fit, conflict_in_words, estimate_of
 from ppafo.identification.fit import fit as fit_residuals
 from ppafo.identification.least_squares import FitNumber, FitRuns, ResidualBlock
 from ppafo.identification.noise import Noise, whiten
 from ppafo.identification.source import kind_of
 from ppafo.identification.trajectory.experiment import (
-    FITTED_CHANNELS,
     GAIN_OF,
     LAG_OF,
     TIME_OFFSET,
@@ -55,7 +53,7 @@ from ppafo.signals.faults import (
     resolution_of,
     rounding_of,
 )
-from ppafo.signals.recording import CHANNELS, Channel, Floats, Recording, RecordingKind
+from ppafo.signals.recording import CHANNELS, Channel, Floats, Recording
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, SUPPLY, sample_period
 from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs, with_prescribed_angle
@@ -75,7 +73,6 @@ _BURST = 6.0
 """Ratio of residuals to the noise that lasts [-] from which they are no noise; slow noise has up to 5.5."""
 _WHOLE = 1.0e-6
 """Rounding tolerance of the last sample interval, as a fraction of an interval [-]."""
-Indices = NDArray[np.intp]
 
 FIT_TOLERANCE = 0.02
 """Error tolerance of a run of a fit, relative to a normal run [-]; finite differences are then accurate to 1e-3."""
@@ -94,31 +91,19 @@ _MAXIMUM_RECORDS = 100_000
 
 
 @dataclass(frozen=True, slots=True)
-class FitChannel:
-    """Channel of an experiment: samples [rad] or [Pa], and their noise floor."""
-
-    name: str
-    values: Floats
-    floor: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
 class PreparedExperiment:
     """Experiment prepared for fitting: completed scenario, planned run, and samples located between its records.
 
-    ``time`` has the sample times in the run [s]; a fitted offset may shift them by up to ``reach`` [s]. ``run`` has the
-    time step and clock of all runs. A sample lies a ``fraction`` [-] of the interval after the record ``before``.
-    ``inputs`` are the inputs at each step, computed from ``recorded``; None without recorded inputs.
+    ``measured`` has the samples at their times in the run; a fitted offset may shift them by up to ``reach`` [s].
+    ``run`` has the time step and clock of all runs. ``floors`` are the least noise by channel. ``inputs`` are those of
+    each step, computed from ``recorded``; None without recorded inputs.
     """
 
-    label: str
     scenario: Scenario
     run: Run
-    time: Floats
-    channels: tuple[FitChannel, ...]
+    measured: Recording
+    floors: Mapping[str, float]
     reach: float
-    before: Indices
-    fraction: Floats
     recorded: RecordedInputs | None = None
     inputs: StepInputs | None = None
 
@@ -138,59 +123,49 @@ def prepare(experiment: FittedExperiment, numbers: Mapping[str, float], reach: f
             f"{where}: {recording.label} has {time.size} samples from the start at {experiment.start:g} s on, but "
             f"needs at least {MINIMUM_SAMPLES}"
         )
-    channels = [
-        FitChannel(name, recording[name][inside], experiment.noise.get(name, 0.0)) for name in experiment.channels
-    ]
+    channels = {name: Channel(recording[name][inside], CHANNELS[name].unit) for name in experiment.channels}
     actuator = experiment.scenario.device.actuator
     stops = actuator.angle_min, actuator.angle_max
-    for channel in channels:
+    for name, channel in channels.items():
         clipped = max(plateaus(channel.values), key=lambda plateau: plateau.count)
         # With a coarse converter, a vane that rests at its stop repeats one value without saturation of the sensor.
-        rests = channel.name == ANGLE and any(abs(clipped.value - stop) < _ZERO_OF_ANGLE for stop in stops)
-        has_noise = channel.floor > 0.0 or noise_of(channel.values) > 0.0
+        rests = name == ANGLE and any(abs(clipped.value - stop) < _ZERO_OF_ANGLE for stop in stops)
+        has_noise = name in experiment.noise or noise_of(channel.values) > 0.0
         if is_at_limit(channel.values, clipped) and not (rests or has_noise):
             raise IdentificationError(
-                f"{where}: channel '{channel.name}' stays at its {clipped.word} value for {clipped.count} of "
+                f"{where}: channel '{name}' stays at its {clipped.word} value for {clipped.count} of "
                 f"{channel.values.size} samples: the sensor is probably saturated"
             )
     scenario = scenario_of(experiment)
     scenario = replace(scenario, run=replace(scenario.run, duration=float(time[-1]) + reach))
     recorded = RecordedInputs(recording, experiment.inputs, experiment.start) if experiment.inputs else None
-    return prepare_samples(experiment.label, scenario, time, channels, reach, numbers, recorded)
+    measured = Recording(experiment.label, time, channels, kind=recording.kind)
+    return prepare_samples(scenario, measured, experiment.noise, reach, numbers, recorded)
 
 
 def prepare_samples(
-    label: str,
     scenario: Scenario,
-    time: Floats,
-    channels: Sequence[FitChannel],
+    measured: Recording,
+    floors: Mapping[str, float],
     reach: float,
     numbers: Mapping[str, float],
     recorded: RecordedInputs | None = None,
 ) -> PreparedExperiment:
     """Return a prepared experiment from samples, at ``numbers`` [SI], with time offsets up to ``reach`` [s]."""
     run = replace(plan_run(with_numbers(scenario, numbers)), tolerance=FIT_TOLERANCE)
-    unlocated = np.zeros(time.size)
-    before = unlocated.astype(np.intp)
-    prepared = PreparedExperiment(label, scenario, run, time, tuple(channels), reach, before, unlocated, recorded)
-    return _locate_samples(prepared, run)
+    return _with_run(PreparedExperiment(scenario, run, measured, floors, reach, recorded), run)
 
 
-def _locate_samples(prepared: PreparedExperiment, run: Run) -> PreparedExperiment:
-    """Locate the samples of an experiment between records that are no finer than needed."""
-    time, recorded = prepared.time, prepared.recorded
+def _with_run(prepared: PreparedExperiment, run: Run) -> PreparedExperiment:
+    """Return an experiment with a run whose records are no finer than the samples need."""
+    time, recorded = prepared.measured.time, prepared.recorded
     every = _steps_between_samples(time, prepared.reach, run.step)
     records = math.ceil((float(time[-1]) + prepared.reach) / (run.step * every) - _FITS)
-    position = time / (run.step * every)
-    before = np.minimum(np.floor(position + _FITS), records).astype(np.intp)
-    fraction = np.maximum(position - before, 0.0)
-    # Rounding of the clock must not make a sample lie between two records.
-    fraction[fraction < _FITS] = 0.0
     frozen = replace(run, record_every=every, step_count=math.ceil(records * every - _FITS), needs_parts=True)
     if recorded is not None and ANGLE in recorded.names and isinstance(prepared.scenario.motion, FreeMotion):
         frozen = with_prescribed_angle(frozen, prepared.scenario.motion.angle)
     inputs = None if recorded is None else step_inputs(recorded, prepared.scenario.device, frozen)
-    return replace(prepared, run=frozen, before=before, fraction=fraction, inputs=inputs)
+    return replace(prepared, run=frozen, inputs=inputs)
 
 
 def _steps_between_samples(time: Floats, reach: float, step: float) -> float:
@@ -228,7 +203,7 @@ def signals_of(
 
     A failed run is NaN throughout. Experiments run in parallel, one thread each.
     """
-    columns = [columns_in(prepared.label, numbers, points) for prepared in experiments]
+    columns = [columns_in(prepared.measured.label, numbers, points) for prepared in experiments]
     arguments = experiments, columns, [points.shape[1]] * len(experiments)
     workers = min(len(experiments), os.cpu_count() or 1)
     if workers == 1:
@@ -243,9 +218,9 @@ def residuals_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Fi
     signals = signals_of(experiments, numbers, points)
     return np.concatenate(
         [
-            channel.values[:, None] - modelled[channel.name]
+            prepared.measured[name][:, None] - modelled[name]
             for prepared, modelled in zip(experiments, signals, strict=True)
-            for channel in prepared.channels
+            for name in prepared.measured.names
         ]
     )
 
@@ -264,17 +239,19 @@ def blocks_of(
     halved = []
     for prepared in experiments:
         scenario = replace(prepared.scenario, run=replace(prepared.scenario.run, step=0.5 * prepared.run.step))
-        run = plan_run(with_numbers(scenario, numbers_in(prepared.label, numbers, point)))
-        halved.append(_locate_samples(prepared, replace(run, tolerance=_FINER * prepared.run.tolerance)))
+        run = plan_run(with_numbers(scenario, numbers_in(prepared.measured.label, numbers, point)))
+        halved.append(_with_run(prepared, replace(run, tolerance=_FINER * prepared.run.tolerance)))
     fine = signals_of(halved, numbers, point[:, None])
     for prepared, coarse_signals, fine_signals in zip(experiments, coarse, fine, strict=True):
-        for channel in prepared.channels:
-            error = (fine_signals[channel.name][:, 0] - coarse_signals[channel.name][:, 0]) / (1.0 - _FINER)
+        for name in prepared.measured.names:
+            samples = prepared.measured[name]
+            error = (fine_signals[name][:, 0] - coarse_signals[name][:, 0]) / (1.0 - _FINER)
             error = error if np.isfinite(error).all() else np.zeros_like(error)
-            rounded = rounding_of(channel.values, resolution_of(channel.values))
-            floor = np.maximum(max(channel.floor, float(np.sqrt(np.mean(np.square(error))))), rounded)
-            last = first + len(channel.values)
-            blocks.append(ResidualBlock(prepared.label, channel.name, slice(first, last), floor, error))
+            rounded = rounding_of(samples, resolution_of(samples))
+            floor = max(prepared.floors.get(name, 0.0), float(np.sqrt(np.mean(np.square(error)))))
+            last = first + len(samples)
+            rows = slice(first, last)
+            blocks.append(ResidualBlock(prepared.measured.label, name, rows, np.maximum(floor, rounded), error))
             first = last
     return tuple(blocks)
 
@@ -311,7 +288,7 @@ def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], coun
     Runs that differ only in zeros, gains and lags of compared sensors are simulated once. A pressure sensor reads gauge
     pressure.
     """
-    of_sensors = {f"{kind}{channel.name}" for channel in prepared.channels for kind in (ZERO_OF, GAIN_OF, LAG_OF)}
+    of_sensors = {f"{kind}{name}" for name in prepared.measured.names for kind in (ZERO_OF, GAIN_OF, LAG_OF)}
     errors = {path: column for path, column in columns.items() if path in of_sensors}
     running = {path: column for path, column in columns.items() if path not in errors}
     table = np.array([np.broadcast_to(column, (count,)) for column in running.values()]).reshape(-1, count)
@@ -324,7 +301,7 @@ def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], coun
         gain, zero = (np.asarray(errors.get(f"{path}{name}", 0.0)) for path in (GAIN_OF, ZERO_OF))
         read = values[:, run_of.ravel()]
         if (lags := errors.get(f"{LAG_OF}{name}")) is not None:
-            read = _lagging(read, np.broadcast_to(lags, (count,)), sample_period(prepared.time))
+            read = _lagging(read, np.broadcast_to(lags, (count,)), sample_period(prepared.measured.time))
         signals[name] = rest + (1.0 + gain) * (read - rest) + zero
     return signals
 
@@ -399,24 +376,23 @@ def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], co
         pressure_1, pressure_2 = pressures_of(run.program.actuator, plant, *states)
         signals["angle"][:, element] = angle[:, element]
         signals["pressure_1"][:, element], signals["pressure_2"][:, element] = pressure_1, pressure_2
-    return {channel.name: signals[channel.name] for channel in prepared.channels}
+    return {name: signals[name] for name in prepared.measured.names}
 
 
 def _at_samples(values: Floats, prepared: PreparedExperiment, offsets: Floats) -> Floats:
     """Return a state at the sample times, interpolated linearly between records; each run has its time offset [s]."""
-    if offsets.any():
-        # Before the first record the device stands still.
-        interval = prepared.run.step * prepared.run.record_every
-        position = np.clip((prepared.time[:, None] - offsets) / interval, 0.0, len(values) - 1.0)
-        before = np.minimum(position.astype(np.intp), len(values) - 2)
-        elements = np.arange(len(offsets))
-        previous, following = values[before, elements], values[before + 1, elements]
-        return np.asarray(previous + (position - before) * (following - previous))
-    previous = values[prepared.before]
-    if not prepared.fraction.any():
-        return previous
-    following = values[np.minimum(prepared.before + 1, len(values) - 1)]
-    return np.asarray(previous + prepared.fraction[:, None] * (following - previous))
+    position = (prepared.measured.time[:, None] - offsets) / (prepared.run.step * prepared.run.record_every)
+    # Before the first record the device stands still.
+    position = np.clip(position, 0.0, len(values) - 1.0)
+    # Rounding of the clock must not make a sample lie between two records.
+    is_moved = bool(offsets.any())
+    rounding = 0.0 if is_moved else _FITS
+    before = np.minimum(np.floor(position + rounding).astype(np.intp), len(values) - 1 - is_moved)
+    fraction = np.maximum(position - before, 0.0)
+    fraction[fraction < rounding] = 0.0
+    runs = np.arange(len(offsets))
+    previous, following = values[before, runs], values[np.minimum(before + 1, len(values) - 1), runs]
+    return np.asarray(previous + fraction * (following - previous))
 
 
 @dataclass(frozen=True, slots=True)
@@ -455,22 +431,18 @@ class NuisanceParameter:
     share: float
 
 
-@dataclass(frozen=True, slots=True)
-class TrajectoryFit:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrajectoryFit(Identified):
     """Result of a trajectory fit: estimates of the unknowns, and the updated tolerances (``known``).
 
     ``covariance`` [SI] and ``correlation`` are in the order of ``estimates``. ``channels`` are residual statistics.
     ``models`` are the fitted runs at the sample times and ``measurements`` the samples, both by experiment with the
-    time of the run. ``scenarios`` have the fitted values. ``conflict`` is a sentence on recordings or channels whose
-    separate estimates differ from the common estimates, empty if all agree. ``remarks`` are sentences on the fit as a
-    whole, which prevent a pass, ``outliers`` on samples left out; ``notes`` are all sentences for a report, and
-    ``expected`` has the benefit of candidates, best first.
+    time of the run. ``scenarios`` have the fitted values. ``expected`` has the benefit of candidates, best first.
     """
 
     problem: TrajectoryProblem
     numbers: tuple[FitNumber, ...]
     fit: Fit
-    estimates: tuple[Estimate, ...]
     covariance: Floats
     correlation: Floats
     known: tuple[NuisanceParameter, ...]
@@ -478,30 +450,11 @@ class TrajectoryFit:
     models: tuple[Recording, ...]
     measurements: tuple[Recording, ...]
     scenarios: tuple[Scenario, ...]
-    conflict: str
-    remarks: tuple[str, ...]
-    outliers: tuple[str, ...] = ()
     expected: "tuple[ExpectedBenefit, ...]" = ()
-    notes: tuple[str, ...] = ()
 
     def estimate(self, name: str) -> Estimate:
         """Return the estimate at a path; ``valve.area`` means the valve of the first experiment."""
         return {estimate.path: estimate for estimate in self.estimates}[full_path(name, self.scenarios[0])]
-
-    @property
-    def is_good(self) -> bool:
-        """True if the search converged to a valid device and no part of the recordings contradicts the rest."""
-        return not self.conflict and not self.remarks
-
-    @property
-    def kind(self) -> RecordingKind:
-        """Common origin of all recordings: measured, simulated or synthetic."""
-        return kind_of(recording.kind for recording in self.measurements)
-
-    @property
-    def values(self) -> dict[str, float]:
-        """Estimated values by path [SI]."""
-        return {estimate.path: estimate.value for estimate in self.estimates}
 
 
 def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> TrajectoryFit:
@@ -592,29 +545,27 @@ def _result(
     fitted: Fit,
 ) -> TrajectoryFit:
     """Return the result of a finished search: estimates, updated tolerances, and the model beside each recording."""
-    models, measurements, channels, outliers = list[Recording](), list[Recording](), list[ChannelFit](), list[str]()
-    signals = signals_of(runs, numbers, fitted.values[:, None])
-    for experiment, run, columns in zip(problem.experiments, runs, signals, strict=True):
-        units = {name: CHANNELS[name].unit for name in columns}
-        modelled = {name: Channel(column[:, 0], units[name]) for name, column in columns.items()}
-        samples = {channel.name: Channel(channel.values, units[channel.name]) for channel in run.channels}
-        models.append(Recording(f"model of {run.label}", run.time, modelled, kind="simulated"))
-        measurements.append(Recording(experiment.label, run.time, samples, kind=experiment.recording.kind))
-        for channel in run.channels:
-            residuals = channel.values - columns[channel.name][:, 0]
+    models, channels, outliers = list[Recording](), list[ChannelFit](), list[str]()
+    measurements = [run.measured for run in runs]
+    for measured, signals in zip(measurements, signals_of(runs, numbers, fitted.values[:, None]), strict=True):
+        modelled = {name: Channel(column[:, 0], measured.unit(name)) for name, column in signals.items()}
+        model = Recording(f"model of {measured.label}", measured.time, modelled, kind="simulated")
+        models.append(model)
+        for name in measured.names:
+            residuals, sensor = measured[name] - model[name], fitted.sensors[name]
             channels.append(
                 ChannelFit(
-                    experiment=run.label,
-                    channel=channel.name,
-                    unit=units[channel.name],
-                    noise=fitted.sensors[channel.name].deviation,
-                    order=fitted.sensors[channel.name].order,
+                    experiment=measured.label,
+                    channel=name,
+                    unit=measured.unit(name),
+                    noise=sensor.deviation,
+                    order=sensor.order,
                     rms=float(np.sqrt(np.mean(residuals * residuals))),
                     largest=float(np.max(np.abs(residuals))),
-                    span=float(np.ptp(channel.values)),
+                    span=float(np.ptp(measured[name])),
                 )
             )
-    times = {run.label: run.time for run in runs}
+    times = {measured.label: measured.time for measured in measurements}
     for block in blocks:
         left_out = [row - block.rows.start for row in fitted.outliers if block.rows.start <= row < block.rows.stop]
         if left_out:
@@ -641,16 +592,22 @@ def _result(
             if number.is_logarithm:
                 pairs = [(math.exp(value), math.exp(value) * deviation) for value, deviation in pairs]
             known.append(NuisanceParameter(name, number.unit, *pairs[0], *pairs[1], widens, shares.get(widens, 0.0)))
-    scenarios = tuple(with_numbers(run.scenario, numbers_in(run.label, numbers, fitted.values)) for run in runs)
-    remarks = [text for text in dict.fromkeys(broken_rule(scenario.device) for scenario in scenarios) if text]
+    scenarios = tuple(
+        with_numbers(run.scenario, numbers_in(run.measured.label, numbers, fitted.values)) for run in runs
+    )
+    faults = [text for text in dict.fromkeys(broken_rule(scenario.device) for scenario in scenarios) if text]
     if fitted.edge:
         texts = {item.path: f"{item.value:.4g} {item.unit}".rstrip(" -") for item in estimates}
         sides = {path: "above" if side > 0 else "below" for path, side in fitted.edge.items()}
         wanted = " and ".join(f"{path} {sides[path]} {text}" for path, text in texts.items() if path in sides)
-        remarks.append(f"the recordings favour {wanted}, where every run fails")
+        faults.append(f"the recordings favour {wanted}, where every run fails")
     elif not fitted.has_converged:
-        remarks.append(f"the search stopped after {fitted.evaluations} runs before it converged")
+        faults.append(f"the search stopped after {fitted.evaluations} runs before it converged")
+    tolerances = count_of(len(known), "tolerance")
     return TrajectoryFit(
+        procedure="trajectory",
+        summary=f"{count_of(len(rows), 'number')} fitted to {count_of(len(runs), 'recording')}, {tolerances}",
+        kind=kind_of(recording.kind for recording in measurements),
         problem=problem,
         numbers=numbers,
         fit=fitted,
@@ -663,8 +620,8 @@ def _result(
         measurements=tuple(measurements),
         scenarios=scenarios,
         conflict=conflict,
-        remarks=tuple(remarks),
-        outliers=tuple(outliers),
+        remarks=(*outliers, *faults),
+        faults=tuple(faults),
     )
 
 
@@ -733,10 +690,7 @@ class ExpectedBenefit:
 
 
 def expected_information(fit: TrajectoryFit, candidates: Sequence[CandidateExperiment]) -> tuple[ExpectedBenefit, ...]:
-    """Return the expected benefit of each candidate experiment, the most informative first.
-
-    Raises IdentificationError for a candidate without noise in any channel that can be fitted.
-    """
+    """Return the expected benefit of each candidate experiment, the most informative first."""
     benefits = [_benefit(fit, candidate) for candidate in candidates]
     return tuple(sorted(benefits, key=lambda benefit: -benefit.gain))
 
@@ -744,10 +698,6 @@ def expected_information(fit: TrajectoryFit, candidates: Sequence[CandidateExper
 def _benefit(fit: TrajectoryFit, candidate: CandidateExperiment) -> ExpectedBenefit:
     """Return the expected benefit of a candidate, from its whitened Jacobian added to the information of the fit."""
     noise = dict(candidate.noise) or {name: model.deviation for name, model in fit.fit.sensors.items()}
-    if not noise or any(name not in FITTED_CHANNELS or not deviation > 0.0 for name, deviation in noise.items()):
-        raise IdentificationError(
-            f"candidate '{candidate.label}': noise must be above 0 for at least one of {', '.join(FITTED_CHANNELS)}"
-        )
     # What belongs to one recording, such as its trigger, another experiment says nothing of.
     common = [index for index, number in enumerate(fit.numbers) if not number.recordings]
     slopes = _slopes(candidate, noise, [fit.numbers[index] for index in common], fit.fit.values[common])
@@ -775,15 +725,16 @@ def _slopes(
     """Return the Jacobian [SI] (samples of all channels, numbers) of the samples of a candidate at a point [SI]."""
     count = math.floor(candidate.scenario.run.duration / candidate.interval + _WHOLE)
     times = candidate.interval * np.arange(count + 1, dtype=np.float64)
-    channels = [FitChannel(name, np.zeros(times.size)) for name in noise]
+    samples = {name: Channel(np.zeros(times.size), CHANNELS[name].unit) for name in noise}
     values = numbers_in("", numbers, point)
-    prepared = prepare_samples(candidate.label, candidate.scenario, times, channels, reach_of(numbers), values)
+    measured = Recording(candidate.label, times, samples)
+    prepared = prepare_samples(candidate.scenario, measured, noise, reach_of(numbers), values)
 
-    def samples(points: Floats) -> Floats:
+    def signals_of_points(points: Floats) -> Floats:
         signals = signals_at(prepared, columns_in("", numbers, points), points.shape[1])
         return np.concatenate([signals[name] for name in noise])
 
-    runs = FitRuns(samples, tuple(numbers), (), report_nothing, 0, is_motion=True)
+    runs = FitRuns(signals_of_points, tuple(numbers), (), report_nothing, 0, is_motion=True)
     with refused_as(IdentificationError, f"candidate '{candidate.label}'", IdentificationError):
         # As in the fit, a difference is as long as changes the samples by three units of noise in all.
         weight = 1.0 / np.repeat(list(noise.values()), times.size)

@@ -45,9 +45,6 @@ from ppafo.simulation.recorded.replay import locked_vane, replay_scenario, with_
 from ppafo.simulation.recorded.rest import start_of
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.simulation.scenario import Scenario
-from ppafo.wording import known_names
-
-_NOISE_UNITS = {"angle": "rad", "pressure_1": "Pa_d", "pressure_2": "Pa_d"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,28 +67,10 @@ class SectionContext:
     tolerances: Tolerances
 
 
-def noise_of_channels(texts: Mapping[str, str], where: str) -> dict[str, float]:
-    """Parse the noise of each channel into standard deviations [rad], [Pa]; ``where`` is the prefix of messages.
-
-    Raises IdentificationError for a channel that cannot be fitted.
-    """
-    deviations = {}
-    for name, text in texts.items():
-        if name not in _NOISE_UNITS:
-            raise IdentificationError(
-                f"{where}: noise.{name}: channel '{name}' cannot be fitted{known_names(name, _NOISE_UNITS)}"
-            )
-        deviations[name] = quantity_of(f"{where}: noise.{name}", text, _NOISE_UNITS[name])
-    return deviations
-
-
 def trajectory_problem(section: TrajectorySection, context: SectionContext) -> TrajectoryProblem:
     """Convert a section to a fit problem. Raises IdentificationError for a recording used by a bench procedure."""
     experiments = tuple(_experiment(entry, context) for entry in section.experiments)
     scenarios = {experiment.label: experiment.scenario for experiment in experiments}
-    # Samples that a bench procedure used are in its interval, which is a prior here.
-    if message := double_use(context.used, map(use_of, experiments)):
-        raise IdentificationError(f"{context.file}: {message}")
     parameters = [_parameter(entry, scenarios, context) for entry in section.parameters]
     for entry in section.experiments:
         if (limit := entry.time_offset) is not None:
@@ -102,7 +81,11 @@ def trajectory_problem(section: TrajectorySection, context: SectionContext) -> T
             )
     stated = stated_by(context.parameter_set, experiments[0].scenario)
     tolerances = tolerance_parameters(context.tolerances, experiments, parameters, stated)
-    return TrajectoryProblem((*parameters, *tolerances), experiments, section.confidence)
+    problem = TrajectoryProblem((*parameters, *tolerances), experiments, section.confidence)
+    # Samples that a bench procedure used are in its interval, which is a prior here.
+    if message := double_use((*context.used, *map(use_of, experiments))):
+        raise IdentificationError(f"{context.file}: {message}")
+    return problem
 
 
 def _experiment(entry: ExperimentSection, context: SectionContext) -> FittedExperiment:
@@ -129,7 +112,7 @@ def _experiment(entry: ExperimentSection, context: SectionContext) -> FittedExpe
     # The scenario of a replay has the state of the samples already.
     is_read = entry.scenario is not None and entry.initial_state in ("recording", "fitted")
     state: InitialState = "recording" if is_read else "scenario"
-    noise, recording = noise_of_channels(entry.noise, where), source.recording
+    noise, recording = entry.noise.model_dump(exclude_none=True), source.recording
     return FittedExperiment(entry.label, scenario, recording, start, channels, noise, inputs, state, source.trace)
 
 
@@ -213,7 +196,7 @@ def solve_section(section: TrajectorySection, context: SectionContext, report: R
             scenario = _scenario(entry.scenario, entry.overrides, context)
             if entry.interval > (longest := scenario.run.duration):
                 raise IdentificationError(f"{where}: interval = {entry.interval:g} s must be at most {longest:g} s")
-            noise = noise_of_channels(entry.noise, where)
+            noise = entry.noise.model_dump(exclude_none=True)
             candidates.append(CandidateExperiment(entry.label, scenario, noise, entry.interval))
         fitted = fit(problem, report)
         expected = expected_information(fitted, candidates)
@@ -222,7 +205,7 @@ def solve_section(section: TrajectorySection, context: SectionContext, report: R
             raise
         raise type(error)(f"{context.file}: {error}") from error
     sources = tuple(RecordingSource(experiment.recording, experiment.source) for experiment in problem.experiments)
-    remarks = [*remarks_on_readings(sources), *fitted.outliers, *fitted.remarks]
+    remarks = [*remarks_on_readings(sources), *fitted.remarks]
     for estimate in fitted.estimates:
         measured = context.bench.get(estimate.path)
         if measured is None or not (measured.is_usable and estimate.is_usable):
@@ -234,4 +217,4 @@ def solve_section(section: TrajectorySection, context: SectionContext, report: R
             remarks.append(
                 f"{estimate.path}: fitted {low} to {high} {ends[0][1]}, bench procedure {lowest} to {highest}"
             )
-    return replace(fitted, expected=expected, notes=tuple(remarks))
+    return replace(fitted, expected=expected, remarks=tuple(remarks))

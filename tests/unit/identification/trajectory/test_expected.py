@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from ppafo.errors import IdentificationError
 from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.trajectory.experiment import FittedExperiment, TrajectoryProblem
 from ppafo.identification.trajectory.fitting import CandidateExperiment, TrajectoryFit, expected_information, fit
@@ -49,8 +48,3 @@ def test_more_noise_and_a_shorter_run_bring_less(found: TrajectoryFit, experimen
         CandidateExperiment("whole", experiment.scenario, NOISE),
     ]
     assert expected_information(found, candidates)[0].label == "whole"
-
-
-def test_a_candidate_with_noise_of_no_channel_is_refused(found: TrajectoryFit, experiment: FittedExperiment) -> None:
-    with pytest.raises(IdentificationError, match="noise must be above 0"):
-        expected_information(found, [CandidateExperiment("free", experiment.scenario, {"torque": 1.0})])

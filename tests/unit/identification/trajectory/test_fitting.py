@@ -56,7 +56,7 @@ def test_the_noise_that_was_put_on_the_samples_is_found(three: TrajectoryFit, ex
         assert channel.noise == pytest.approx(experiment.noise[channel.channel], rel=0.12)
         assert channel.rms == pytest.approx(channel.noise, rel=0.12)
     assert three.conflict == ""
-    assert three.remarks == ()
+    assert three.faults == ()
 
 
 def test_a_search_that_ends_where_no_run_succeeds_says_which_number_is_favoured(
@@ -64,7 +64,7 @@ def test_a_search_that_ends_where_no_run_succeeds_says_which_number_is_favoured(
 ) -> None:
     ended = dataclasses.replace(three.fit, has_converged=False, edge={"foot_plate.inertia": 1})
     monkeypatch.setattr(fitting, "fit_residuals", lambda *_arguments, **_settings: ended)
-    (remark,) = fit(three.problem).remarks
+    (remark,) = fit(three.problem).faults
     value = three.estimate("foot_plate.inertia").value
     assert f"the recordings favour foot_plate.inertia above {value:.4g} kg m^2, where every run fails" in remark
     assert "before it converged" not in remark

@@ -87,6 +87,5 @@ def test_samples_that_stand_out_are_left_out_and_said(experiment: FittedExperime
     found = fitted(spoilt, FitNumber("foot_plate.inertia"))
 
     said = "experiment 'step': 2 outliers of pressure_2 left out, the first at 0.04 s"
-    assert found.outliers == (said,)
-    assert found.remarks == ()
+    assert (found.remarks, found.faults) == ((said,), ())
     assert found.estimates[0].is_identified

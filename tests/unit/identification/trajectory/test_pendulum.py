@@ -89,7 +89,7 @@ def test_bounds_of_friction_change_nothing_where_they_are_wide(
         FitNumber("friction.dynamic_torque", dynamic, **LOOSE),
         FitNumber("friction.static_torque", static, **LOOSE),
     )
-    assert found.remarks == ()
+    assert found.faults == ()
     for estimate in found.estimates:
         assert estimate.verdict == "identified", estimate.explanation
         assert estimate.low <= PLANTED[estimate.path] <= estimate.high

@@ -16,7 +16,7 @@ from ppafo.identification.trajectory.experiment import (
     numbers_of,
     with_numbers,
 )
-from ppafo.identification.trajectory.fitting import fit, prepare
+from ppafo.identification.trajectory.fitting import fit, prepare, signals_of
 from ppafo.running import simulate
 from ppafo.simulation.scenario import Scenario
 
@@ -59,7 +59,6 @@ def test_a_parameter_that_makes_no_sense_is_refused(
     [
         ({"channels": ("torque",)}, "channel 'torque' cannot be fitted"),
         ({"channels": ()}, "no channel"),
-        ({"noise": {"angle": 0.0}}, "must be above 0"),
         ({"inputs": ("comand",)}, "not a measured input, did you mean 'command'"),
         ({"inputs": ("supply_pressure",)}, r"has no channel 'supply_pressure', did you mean 'pressure_1'"),
     ],
@@ -93,17 +92,15 @@ def test_too_few_samples_after_the_start_are_refused(experiment: FittedExperimen
 
 def test_samples_on_the_grid_are_taken_from_the_record_as_they_are(experiment: FittedExperiment) -> None:
     prepared = prepare(experiment, {})
-    assert not prepared.fraction.any()
     assert prepared.run.record_every == prepared.run.steps_per_sample
-    assert len(prepared.time) == len(experiment.recording)
+    assert len(prepared.measured) == len(experiment.recording)
 
 
 def test_samples_off_the_grid_lie_between_two_records(experiment: FittedExperiment) -> None:
     recording = experiment.recording.resample(np.linspace(0.0, 0.35, 223))
-    prepared = prepare(dataclasses.replace(experiment, recording=recording), {})
-    assert prepared.fraction.any()
-    at = (prepared.before + prepared.fraction) * prepared.run.step * prepared.run.record_every
-    assert at == pytest.approx(recording.time, abs=1e-9)
+    (signals,) = signals_of([prepare(dataclasses.replace(experiment, recording=recording), {})], (), np.zeros((0, 1)))
+    clean = simulate(experiment.scenario).recording
+    assert signals["angle"][:, 0] == pytest.approx(np.interp(recording.time, clean.time, clean["angle"]), abs=2e-3)
 
 
 def test_the_initial_state_is_that_in_which_the_samples_up_to_the_start_end(experiment: FittedExperiment) -> None:

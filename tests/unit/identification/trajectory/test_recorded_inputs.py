@@ -191,7 +191,7 @@ def test_a_late_trigger_is_found_and_leaves_the_other_numbers_alone(late: Fitted
     assert abs(offset.value - LATE) < 3.0 / 1.96 * offset.half_width
     inertia = found.estimate("foot_plate.inertia")
     assert abs(inertia.value - 0.0084) < 3.0 / 1.96 * inertia.half_width
-    assert found.remarks == ()
+    assert found.faults == ()
     ignored = fit(TrajectoryProblem((INERTIA, FLOW), (late,)))
     assert abs(ignored.values["foot_plate.inertia"] / 0.0084 - 1.0) > 10.0 * inertia.half_width / inertia.value
 
