@@ -468,9 +468,6 @@ def _part(part: Identified, tolerances: Iterable[str], before: ParameterSet) -> 
     for item in part.estimates:
         # Of a conflict the explanation of each number is the one sentence that stands above.
         said += [f"{item.path}: {item.explanation}"] if item.explanation != part.conflict else []
-        if math.isnan(item.value):
-            rows.append((item.path, "no value", "", item.verdict))
-            continue
         numbers = [_shown(number, item.path, item.unit, before) for number in (item.value, item.low, item.high)]
         text, *ends = interval_texts(*(number for number, _ in numbers))
         shown = f"{text} {numbers[0][1]}".removesuffix(" -").rstrip()

@@ -100,11 +100,11 @@ class Estimate:
     """Value in ``unit`` (SI text) with its confidence interval ``low`` to ``high`` at the stated ``confidence``.
 
     ``path`` is a dotted path in a parameter set, such as ``actuator.torque_constant``; a quantity without an entry in
-    sets has a path of its own. An estimate that could not be made has NaN for value and interval. ``explanation`` is
-    one sentence: the sources of the uncertainty, the quantities that the value trades off against, or the limits of its
-    validity. ``recordings`` names each source with its hash: ``static.csv sha256:0123abcd...``. ``size`` is a typical
-    magnitude [``unit``] of a quantity that may be zero, such as the zero of a sensor. ``beside`` are numbers
-    without unit that a set needs with the value, by path, such as the command of a node of a table.
+    sets has a path of its own. ``explanation`` is one sentence: the sources of the uncertainty, the quantities that the
+    value trades off against, or the limits of its validity. ``recordings`` names each source with its hash:
+    ``static.csv sha256:0123abcd...``. ``size`` is a typical magnitude [``unit``] of a quantity that may be zero, such
+    as the zero of a sensor. ``beside`` are numbers without unit that a set needs with the value, by path, such as the
+    command of a node of a table.
     """
 
     path: str

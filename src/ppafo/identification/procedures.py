@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import get_args
 
 from ppafo.errors import IdentificationError, PpafoError, noted_in, raise_noted
-from ppafo.identification.bench.flow import FlowLaw, OpenValveFlowProblem
+from ppafo.identification.bench.flow import LARGEST_COEFFICIENT, FlowLaw, OpenValveFlowProblem
 from ppafo.identification.bench.free_decay import FreeDecayProblem
 from ppafo.identification.bench.law import BenchContext, BenchLaw, BenchResult
 from ppafo.identification.bench.readings import check_channels
@@ -28,8 +28,6 @@ from ppafo.wording import percentage
 
 _NEAR = 1.5
 """Largest ratio [-] of a discharge coefficient in another unit to the value of the set, for the unit to be accused."""
-_LARGEST_COEFFICIENT = 1.0
-"""Discharge coefficient [-] of a jet as wide as its opening: above it, the area stated or a unit is wrong."""
 _IMPOSSIBLE, _OTHER_UNITS = 300.0, ("N m", "Pa_d")
 """Ratio to the value of the set that no device of its kind has [-], and units that are tried only for such a value."""
 _LARGE_SCATTER, _SMOOTHER = 0.01, 5.0
@@ -60,7 +58,7 @@ def with_tried_units(
     others = [name for name, channel in channels.items() if channel.unit in _OTHER_UNITS]
     for estimate in result.estimates:
         ratio = estimate.value / (context.number(estimate.path) or math.inf)
-        is_coefficient = estimate.path.endswith(".discharge_coefficient") and estimate.value > _LARGEST_COEFFICIENT
+        is_coefficient = estimate.path.endswith(".discharge_coefficient") and estimate.value > LARGEST_COEFFICIENT
         if is_coefficient or (others and not 1.0 / _IMPOSSIBLE < (ratio or 1.0) < _IMPOSSIBLE):
             impossible.append(estimate.path)
     if not (impossible or result.scatter > _LARGE_SCATTER):

@@ -73,8 +73,8 @@ _NEARLY_EQUAL = 0.9
 """Pressure ratio [-] above which the pressures are nearly equal."""
 _REGIMES = "choked flow", "subsonic flow", "flow at nearly equal pressures"
 """Names of the flow regimes, by pressure ratio."""
-_LARGEST_COEFFICIENT = 1.0
-"""Largest possible discharge coefficient [-]: the flow of a loss-free nozzle."""
+LARGEST_COEFFICIENT = 1.0
+"""Largest possible discharge coefficient [-], of a jet as wide as its opening: above it the area or a unit is wrong."""
 _GRAMS_PER_BAR = 1.0e8
 """Conversion factor from kg/(s Pa) to g/s per bar."""
 _SIZE = FitNumber("size")
@@ -501,7 +501,7 @@ class OpenValveFlowProblem(FlowLaw):
         )
         found, *others = result.estimates
         # Other sizes than a discharge coefficient have a unit.
-        if area is None or found.unit or found.low <= _LARGEST_COEFFICIENT:
+        if area is None or found.unit or found.low <= LARGEST_COEFFICIENT:
             return result
         doubt = (
             f"Cd = {found.value:.3g} is impossible, above 1: mass_flow or a pressure has a wrong unit, or the "
