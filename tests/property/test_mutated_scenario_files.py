@@ -50,7 +50,7 @@ def assert_can_be_run(scenario: Scenario) -> None:
         count = whole / scenario.run.step
         assert round(count) >= 1
         assert abs(count - round(count)) < 1e-5
-    assert scenario.run.duration / scenario.run.step <= 1.0001e8
+    assert scenario.run.duration / scenario.run.step <= 1.0001e9
     assert 0.0 <= scenario.sensors.delay <= min(scenario.run.duration, 1.0001e5 * scenario.run.step)
     assert (
         scenario.device.actuator.angle_min - 1e-6 <= start_angle(scenario) <= scenario.device.actuator.angle_max + 1e-6

@@ -15,7 +15,8 @@ from ppafo.simulation.overrides import override_document
 from ppafo.simulation.scenario import Scenario
 from ppafo.units.shown import shown_text
 
-MAXIMUM_STEPS = 1.0e8
+MAXIMUM_STEPS = 1.0e9
+"""Largest number of steps of a run."""
 MAXIMUM_OUTPUTS = 5.0e6
 # What is measured during a delay is stored, for each run of an ensemble.
 MAXIMUM_STEPS_OF_DELAY = 1.0e5

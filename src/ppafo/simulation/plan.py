@@ -30,13 +30,12 @@ from ppafo.model.sensors import SensorParameters
 from ppafo.parameters.device import Gas
 from ppafo.parameters.effects import effect_rows, effects_of
 from ppafo.parameters.plant import first_settings, plant_parameters, valve_settings, venting_valve
+from ppafo.simulation.clock import MAXIMUM_STEPS
 from ppafo.simulation.profiles import profile_bounds, profile_parameters
 from ppafo.simulation.scenario import GasModel, Scenario, vane_motion
 
 if TYPE_CHECKING:
     from ppafo.engine.led_leg import LedLeg
-
-MAXIMUM_STEPS = 1.0e9
 
 WHOLE = 1.0e-9
 """Relative difference up to which a number of steps counts as an integer."""

@@ -18,9 +18,10 @@ from ppafo.model.leg import passive_torque
 from ppafo.parameters.device import Actuator, FootPlate, Friction
 from ppafo.parameters.graph import outside
 from ppafo.plugins import Plugins, name_plugins
+from ppafo.simulation.clock import MAXIMUM_STEPS
 from ppafo.simulation.contradictions import check_no_bottle
 from ppafo.simulation.numbers import check_parts
-from ppafo.simulation.plan import MAXIMUM_STEPS, plan_run
+from ppafo.simulation.plan import plan_run
 from ppafo.simulation.python_controller import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
 from ppafo.walking.bottle.coupling import BottleLife, Schedule, life_on_bottle, run_on_bottle

@@ -9,7 +9,15 @@ from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
 
 from ppafo.model.declaration import EmptyRow, Number
-from ppafo.model.plant import Openings, PlantParameters, SinglePort, blended_ports, open_path, single_port_flow
+from ppafo.model.plant import (
+    Openings,
+    PlantParameters,
+    SinglePort,
+    blended_ports,
+    direction_of,
+    open_path,
+    single_port_flow,
+)
 from ppafo.model.ports import opening_time
 from ppafo.model.valves.kind import VENTS_ABOVE, ValveKind, ValveModel, never
 
@@ -58,17 +66,22 @@ class PairState(NamedTuple):
     coil_b: Coil = Coil()
 
 
-def coil_commands(command: float) -> tuple[float, float]:
-    """Commands [-] of valves A and B, equation (14)'s two voltages: 1 energised, 0 not; both 0 to vent."""
-    return (1.0 if command > 0.0 and command < VENTS_ABOVE else 0.0), (1.0 if command < 0.0 else 0.0)
+def energised_valve(command: float) -> float:
+    """Valve that a command energises, equation (14)'s two voltages [-]: 1 valve A, -1 valve B, 0 neither, to vent."""
+    return 0.0 if command > VENTS_ABOVE else direction_of(command)
+
+
+def coil_commands(command: float) -> PairPositions:
+    """Positions [-] that a command requests of both valves."""
+    valve = energised_valve(command)
+    return PairPositions(1.0 if valve > 0.5 else 0.0, 1.0 if valve < -0.5 else 0.0)
 
 
 def advance_ideal(
     valve: EmptyRow, state: PairPositions, command: float, time: float, step: float
 ) -> tuple[PairPositions, PairPositions]:
     """Positions [-] during the step [s] of a pair without delays, and the state."""
-    position_a, position_b = coil_commands(command)
-    positions = PairPositions(position_a, position_b)
+    positions = coil_commands(command)
     return positions, positions
 
 
@@ -111,18 +124,18 @@ def next_coil_event(valve: TimedSolenoid, coil: Coil, wanted: float, time: float
 
 def settle_timed(valve: TimedSolenoid, state: PairState, command: float, time: float) -> PairState:
     """Both coils after the changes and commands that are due at ``time`` [s]."""
-    wanted_a, wanted_b = coil_commands(command)
+    wanted = coil_commands(command)
     return PairState(
-        command_coil(valve, state.coil_a, wanted_a, time, opening_time(valve.opening_delay, 1.0)),
-        command_coil(valve, state.coil_b, wanted_b, time, opening_time(valve.opening_delay, 0.0)),
+        command_coil(valve, state.coil_a, wanted.position_a, time, opening_time(valve.opening_delay, 1.0)),
+        command_coil(valve, state.coil_b, wanted.position_b, time, opening_time(valve.opening_delay, 0.0)),
     )
 
 
 def next_timed_event(valve: TimedSolenoid, state: PairState, command: float, time: float) -> float:
     """Time [s] at which a coil next accepts a pending command or its flow changes; huge for never."""
-    wanted_a, wanted_b = coil_commands(command)
-    event_a = next_coil_event(valve, state.coil_a, wanted_a, time)
-    return min(event_a, next_coil_event(valve, state.coil_b, wanted_b, time))
+    wanted = coil_commands(command)
+    event_a = next_coil_event(valve, state.coil_a, wanted.position_a, time)
+    return min(event_a, next_coil_event(valve, state.coil_b, wanted.position_b, time))
 
 
 def advance_timed(
@@ -133,10 +146,15 @@ def advance_timed(
     return PairPositions(settled.coil_a.position, settled.coil_b.position), settled
 
 
+def pair_openings(position_a: float, position_b: float) -> Openings:
+    """Openings [-] of a pair at two positions."""
+    return Openings(source_1=position_a, vent_1=1.0 - position_a, source_2=position_b, vent_2=1.0 - position_b)
+
+
 def instant_ideal(valve: EmptyRow, state: PairPositions, command: float) -> Openings:
     """Openings [-] at an instant of a pair without delays."""
-    position_a, position_b = coil_commands(command)
-    return Openings(source_1=position_a, vent_1=1.0 - position_a, source_2=position_b, vent_2=1.0 - position_b)
+    wanted = coil_commands(command)
+    return pair_openings(wanted.position_a, wanted.position_b)
 
 
 def rates_ideal(valve: EmptyRow, state: PairPositions, command: float) -> PairPositions:
@@ -146,14 +164,12 @@ def rates_ideal(valve: EmptyRow, state: PairPositions, command: float) -> PairPo
 
 def settle_ideal(valve: EmptyRow, state: PairPositions, command: float, time: float) -> PairPositions:
     """Positions [-] that the command requests."""
-    position_a, position_b = coil_commands(command)
-    return PairPositions(position_a, position_b)
+    return coil_commands(command)
 
 
 def instant_timed(valve: TimedSolenoid, state: PairState, command: float) -> Openings:
     """Openings [-] of the pair with delays at an instant."""
-    position_a, position_b = state.coil_a.position, state.coil_b.position
-    return Openings(source_1=position_a, vent_1=1.0 - position_a, source_2=position_b, vent_2=1.0 - position_b)
+    return pair_openings(state.coil_a.position, state.coil_b.position)
 
 
 def rates_timed(valve: TimedSolenoid, state: PairState, command: float) -> PairState:
