@@ -11,7 +11,6 @@ A step may be divided into parts. Each part ends at an abrupt change, and its le
 import math
 from typing import NamedTuple
 
-from ppafo.engine.scheme.pneumatics import HeldChambers
 from ppafo.model.plant import (
     ActuatorFunctions,
     PlantParameters,
@@ -20,7 +19,6 @@ from ppafo.model.plant import (
     driving_torque,
     holds_still,
     net_torque,
-    torque_less_loads,
     viscous_torque,
 )
 from ppafo.model.ports import friction_at_rest, friction_in_motion, rebound
@@ -87,39 +85,19 @@ LOWEST_REBOUND = 1.0e-7
 """Height of a rebound divided by the angle range [-] below which the vane stays at the stop."""
 
 
-class _FrictionTorques(NamedTuple):
+class FrictionTorques(NamedTuple):
     """Magnitudes of the friction torque [N m]: largest static friction, and kinetic friction."""
 
     at_rest: float
     in_motion: float
 
 
-class _Departure(NamedTuple):
+class Departure(NamedTuple):
     """Start of the second part of a step: fraction of the step [-], angle [rad] and angular velocity [rad/s]."""
 
     fraction: float
     angle: float
     angular_velocity: float
-
-
-class FreeStep(NamedTuple):
-    """Predicted free step: angle without stops [rad], acceleration [rad/s^2], driving torque at the start [N m]."""
-
-    free_angle: float
-    acceleration: float
-    torque: float
-
-
-class FreeEnd(NamedTuple):
-    """Second stage of a free step: driving torque [N m], angle [rad] and angular velocity [rad/s] at the end.
-
-    ``departs`` is 1 if the step contains an event (a stop, a reversal) or the vane is at rest, else 0.
-    """
-
-    torque: float
-    angle: float
-    angular_velocity: float
-    departs: float
 
 
 class FreePart(NamedTuple):
@@ -147,7 +125,7 @@ class PartSlide(NamedTuple):
     """
 
     torque: float
-    friction: _FrictionTorques
+    friction: FrictionTorques
     angular_velocity: float
     departs: float
 
@@ -200,20 +178,20 @@ def time_to_stop(distance: float, angular_velocity: float, acceleration: float) 
 
 def friction_now(
     plant: PlantParameters, angular_velocity: float, pressure_1: float, pressure_2: float
-) -> _FrictionTorques:
+) -> FrictionTorques:
     """Friction torques [N m] at an angular velocity [rad/s] and two absolute pressures [Pa]. Equation (10)."""
-    return _FrictionTorques(
+    return FrictionTorques(
         at_rest=friction_at_rest(plant.static_torque, pressure_1, pressure_2),
         in_motion=friction_in_motion(plant.dynamic_torque, angular_velocity, pressure_1, pressure_2),
     )
 
 
-def depart(
+def depart_at(
     plant: PlantParameters,
-    departure: _Departure,
+    departure: Departure,
     torque: float,
     next_torque: float,
-    friction: _FrictionTorques,
+    friction: FrictionTorques,
     step: float,
 ) -> tuple[float, float]:
     """Angle [rad] and angular velocity [rad/s] at the end of a step whose last part starts at ``departure``.
@@ -310,7 +288,7 @@ def slide_part(
     thrown_back = rebound_velocity(plant, full_velocity, next_torque)
     slid_velocity = thrown_back if begun.meets_stop > 0.5 else full_velocity
 
-    # The sums with 0 are also in ``depart``, so that a vane at rest has its bits.
+    # The sums with 0 are also in ``depart_at``, so that a vane at rest has its bits.
     place = clamp_angle(plant, state.angle + 0.0)
     at_lower, at_upper = place <= plant.angle_min, place >= plant.angle_max
     stays = holds_still(begun.torque + 0.0 * (next_torque - begun.torque), friction.at_rest, at_lower, at_upper)
@@ -345,8 +323,8 @@ def depart_part(
     fraction = velocity / (fall if fall != 0.0 else 1.0) if begun.way != 0.0 else 0.0
     turning_angle = clamp_angle(plant, state.angle + 0.5 * fraction * length * velocity)
     left_torque = begun.torque + fraction * (slid.torque - begun.torque)
-    departure = _Departure(fraction, turning_angle, 0.0)
-    angle, rate = depart(plant, departure, left_torque, slid.torque, slid.friction, length)
+    departure = Departure(fraction, turning_angle, 0.0)
+    angle, rate = depart_at(plant, departure, left_torque, slid.torque, slid.friction, length)
     error = part_error(plant, begun, slid, angle, length, parts=parts)
     departs = slid.departs > 0.5
     return PartEnd(
@@ -380,104 +358,6 @@ def rebound_velocity(plant: PlantParameters, angular_velocity: float, torque: fl
     pressing = max(torque * direction_of(angular_velocity), 0.0)
     lowest = LOWEST_REBOUND * (plant.angle_max - plant.angle_min)
     return after if 0.5 * plant.inertia * after * after > pressing * lowest else 0.0
-
-
-def first_event(
-    plant: PlantParameters, state: PlantState, free_angle: float, acceleration: float, full_velocity: float, step: float
-) -> _Departure:
-    """First event of a step: impact on a stop, reversal, or, for a vane at rest, departure at the start of the step.
-
-    ``free_angle`` [rad] and ``full_velocity`` [rad/s] are the predicted values at the end of the step without the
-    event.
-    """
-    velocity = state.angular_velocity
-    way = direction_of(velocity)
-    # The velocity runs linearly between begin and end: its zero is the reversal.
-    fall = velocity - full_velocity
-    reverses = way != 0.0 and full_velocity * way <= 0.0
-    reversal = velocity / (fall if reverses else 1.0)
-    stop = plant.angle_max if velocity > 0.0 else plant.angle_min
-    hits = way != 0.0 and free_angle != clamp_angle(plant, free_angle)
-    impact = min(time_to_stop(abs(stop - state.angle), abs(velocity), acceleration * way) / step, 1.0)
-    hits_first = hits and not (reverses and reversal < impact)
-    turning_angle = clamp_angle(plant, state.angle + 0.5 * reversal * step * velocity)
-    fraction = impact if hits_first else (reversal if reverses else 0.0)
-    angle = stop if hits_first else (turning_angle if reverses else state.angle)
-    thrown_back = rebound(velocity - impact * fall)
-    return _Departure(fraction, angle, thrown_back if hits_first else 0.0)
-
-
-def begin_free(
-    plant: PlantParameters,
-    state: PlantState,
-    held: HeldChambers,
-    added_torque: float,
-    step: float,
-    *,
-    parts: ActuatorFunctions,
-) -> FreeStep:
-    """Predicted step [s] of a vane that is unconstrained between its stops. Equations (1), (2), (10).
-
-    ``added_torque`` [N m] is the torque at the start of the step in addition to the actuator, gravity included.
-    """
-    velocity = state.angular_velocity
-    way = direction_of(velocity)
-    pressure_1, pressure_2 = parts.held_pressures(plant, held, state)
-    torque = torque_less_loads(parts.torque(plant, state.angle, pressure_1, pressure_2), state.angle) + added_torque
-    friction = friction_now(plant, velocity, pressure_1, pressure_2)
-    net = net_torque(torque, way, friction.in_motion, plant.viscous_damping, state.angle, velocity)
-    acceleration = net / plant.inertia if way != 0.0 else 0.0
-    free_angle = state.angle + step * (velocity + 0.5 * step * acceleration)
-    return FreeStep(free_angle, acceleration, torque)
-
-
-def end_free(
-    plant: PlantParameters,
-    state: PlantState,
-    ahead: HeldChambers,
-    begun: FreeStep,
-    added_torque: float,
-    step: float,
-    *,
-    parts: ActuatorFunctions,
-) -> FreeEnd:
-    """End of the step [s] of a vane that slides without an event, from ``state`` with the new gas and the old motion.
-
-    ``ahead`` are the chambers at the predicted angle. ``added_torque`` [N m] is the torque at the end of the step in
-    addition to the actuator, gravity included.
-    """
-    velocity = state.angular_velocity
-    way = direction_of(velocity)
-    predicted = clamp_angle(plant, begun.free_angle)
-    next_1, next_2 = parts.held_pressures(plant, ahead, state)
-    next_torque = torque_less_loads(parts.torque(plant, predicted, next_1, next_2), predicted) + added_torque
-    next_rate = velocity + begun.acceleration * step
-    friction = friction_now(plant, next_rate, next_1, next_2)
-    net = net_torque(next_torque, way, friction.in_motion, plant.viscous_damping, predicted, next_rate)
-    full_velocity = next_velocity(plant, velocity, begun.acceleration, net, next_rate, step)
-    # '&' and no branch: the step of a walk runs on all lanes.
-    slides_through = (way != 0.0) & (full_velocity * way > 0.0) & (begun.free_angle == predicted)
-    return FreeEnd(
-        torque=next_torque, angle=predicted, angular_velocity=full_velocity, departs=0.0 if slides_through else 1.0
-    )
-
-
-def depart_free(
-    plant: PlantParameters,
-    state: PlantState,
-    ahead: HeldChambers,
-    begun: FreeStep,
-    ended: FreeEnd,
-    step: float,
-    *,
-    parts: ActuatorFunctions,
-) -> tuple[float, float]:
-    """Angle [rad] and angular velocity [rad/s] at the end of the step [s] of a vane with an event in the step."""
-    pressure_1, pressure_2 = parts.held_pressures(plant, ahead, state)
-    friction = friction_now(plant, 0.0, pressure_1, pressure_2)
-    departure = first_event(plant, state, begun.free_angle, begun.acceleration, ended.angular_velocity, step)
-    departure_torque = begun.torque + departure.fraction * (ended.torque - begun.torque)
-    return depart(plant, departure, departure_torque, ended.torque, friction, step)
 
 
 def with_motion(state: PlantState, angle: float, angular_velocity: float) -> PlantState:

@@ -204,7 +204,7 @@ def do_step(parts: Program, lanes: Lanes, now: Now) -> None:
         for lane in lanes:
             parts.leg.reach(parts, lane)
         # Most steps need this in no lane.
-        if any(lane.ended.motion.departs > 0.0 for lane in lanes):
+        if any(lane.ended.departs > 0.0 for lane in lanes):
             for lane in lanes:
                 parts.leg.depart(parts, lane)
     elif parts.angle is None:
