@@ -12,11 +12,9 @@ import math
 from typing import NamedTuple
 
 from ppafo.model.plant import (
-    ActuatorFunctions,
     PlantParameters,
     PlantState,
     direction_of,
-    driving_torque,
     holds_still,
     net_torque,
     viscous_torque,
@@ -228,127 +226,6 @@ def depart_at(
     # A vane that meets a stop in the rest of a step stays there; its rebound would be a second event.
     hits = angle < plant.angle_min or angle > plant.angle_max
     return clamp_angle(plant, angle), (0.0 if hits else rate)
-
-
-def begin_part(
-    plant: PlantParameters, state: PlantState, added_torque: float, longest: float, *, parts: ActuatorFunctions
-) -> tuple[FreePart, float]:
-    """Predicted part of a step of an unconstrained vane, and its length [s]: ``longest`` [s], or up to a stop.
-
-    The gas then works against the motion that actually happens. A vane at rest slides if the torque exceeds static
-    friction. ``added_torque`` [N m] is the torque of the leg at the start, in addition to the torque of the plant.
-    """
-    velocity = state.angular_velocity
-    pressure_1, pressure_2 = parts.pressures(plant, state.angle, state.mass_1, state.mass_2)
-    actuator = parts.torque(plant, state.angle, pressure_1, pressure_2)
-    torque = driving_torque(plant, actuator, state.angle) + added_torque
-    friction = friction_now(plant, velocity, pressure_1, pressure_2)
-    stays = holds_still(torque, friction.at_rest, state.angle <= plant.angle_min, state.angle >= plant.angle_max)
-    leaving = 0.0 if stays else direction_of(torque)
-    way = direction_of(velocity) if velocity != 0.0 else leaving
-    net = net_torque(torque, way, friction.in_motion, plant.viscous_damping, state.angle, velocity)
-    acceleration = net / plant.inertia if way != 0.0 else 0.0
-    distance = plant.angle_max - state.angle if way > 0.0 else state.angle - plant.angle_min
-    gets_there = velocity * velocity + 2.0 * acceleration * way * distance >= 0.0
-    impact = time_to_stop(distance, abs(velocity), acceleration * way)
-    meets_stop = way != 0.0 and gets_there and impact <= longest
-    length = impact if meets_stop else longest
-    stop = plant.angle_max if way > 0.0 else plant.angle_min
-    # The path at the present acceleration: what it misses is in the error of the part.
-    free_angle = clamp_angle(plant, state.angle + length * (velocity + 0.5 * length * acceleration))
-    next_angle = stop if meets_stop else free_angle
-    return FreePart(
-        way=way, acceleration=acceleration, torque=torque, next_angle=next_angle, meets_stop=1.0 if meets_stop else 0.0
-    ), length
-
-
-def slide_part(
-    plant: PlantParameters,
-    state: PlantState,
-    begun: FreePart,
-    added_torque: float,
-    length: float,
-    *,
-    parts: ActuatorFunctions,
-) -> tuple[PartSlide, PartEnd]:
-    """End of a part of a step for an unconstrained vane that slides on or stays at rest.
-
-    ``state`` has the new gas and the angle and velocity at the start. ``added_torque`` [N m] is the torque of the leg
-    at the end, at the predicted angle without reversal.
-    """
-    velocity, way = state.angular_velocity, begun.way
-    next_1, next_2 = parts.pressures(plant, begun.next_angle, state.mass_1, state.mass_2)
-    actuator = parts.torque(plant, begun.next_angle, next_1, next_2)
-    next_torque = driving_torque(plant, actuator, begun.next_angle) + added_torque
-    next_rate = velocity + begun.acceleration * length
-    friction = friction_now(plant, next_rate, next_1, next_2)
-    net = net_torque(next_torque, way, friction.in_motion, plant.viscous_damping, begun.next_angle, next_rate)
-    full_velocity = next_velocity(plant, velocity, begun.acceleration, net, next_rate, length)
-    slides = way != 0.0 and full_velocity * way > 0.0
-    thrown_back = rebound_velocity(plant, full_velocity, next_torque)
-    slid_velocity = thrown_back if begun.meets_stop > 0.5 else full_velocity
-
-    # The sums with 0 are also in ``depart_at``, so that a vane at rest has its bits.
-    place = clamp_angle(plant, state.angle + 0.0)
-    at_lower, at_upper = place <= plant.angle_min, place >= plant.angle_max
-    stays = holds_still(begun.torque + 0.0 * (next_torque - begun.torque), friction.at_rest, at_lower, at_upper)
-    stays_later = holds_still(next_torque, friction.at_rest, at_lower, at_upper)
-    rests = way == 0.0 and stays and stays_later
-
-    slid = PartSlide(
-        torque=next_torque, friction=friction, angular_velocity=full_velocity, departs=0.0 if slides or rests else 1.0
-    )
-    angle = begun.next_angle if slides else place
-    return slid, PartEnd(
-        angle, slid_velocity if slides else 0.0, part_error(plant, begun, slid, angle, length, parts=parts)
-    )
-
-
-def depart_part(
-    plant: PlantParameters,
-    state: PlantState,
-    begun: FreePart,
-    slid: PartSlide,
-    ended: PartEnd,
-    length: float,
-    *,
-    parts: ActuatorFunctions,
-) -> PartEnd:
-    """End of a part in which the vane reverses or starts to move; for any other part ``ended`` is returned unchanged.
-
-    ``state`` is as in ``slide_part``.
-    """
-    velocity = state.angular_velocity
-    fall = velocity - slid.angular_velocity
-    fraction = velocity / (fall if fall != 0.0 else 1.0) if begun.way != 0.0 else 0.0
-    turning_angle = clamp_angle(plant, state.angle + 0.5 * fraction * length * velocity)
-    left_torque = begun.torque + fraction * (slid.torque - begun.torque)
-    departure = Departure(fraction, turning_angle, 0.0)
-    angle, rate = depart_at(plant, departure, left_torque, slid.torque, slid.friction, length)
-    error = part_error(plant, begun, slid, angle, length, parts=parts)
-    departs = slid.departs > 0.5
-    return PartEnd(
-        angle=angle if departs else ended.angle,
-        rate=rate if departs else ended.rate,
-        error=error if departs else ended.error,
-    )
-
-
-def part_error(
-    plant: PlantParameters, begun: FreePart, slid: PartSlide, angle: float, length: float, *, parts: ActuatorFunctions
-) -> float:
-    """Ratio of the error of the angle at the end of a part [rad] to the allowed error [-]."""
-    sliding, damping = slid.friction.in_motion, plant.viscous_damping
-    last = net_torque(slid.torque, begun.way, sliding, damping, begun.next_angle, slid.angular_velocity) / plant.inertia
-    # A change of acceleration over the part bends the path by a sixth of it times the length squared.
-    bent = abs(last - begun.acceleration) * length * length * SIXTH if begun.way != 0.0 else 0.0
-    # The gas worked against a motion that did not happen: that is an error although the vane is where it is.
-    missed = MISSED_FRACTION * abs(angle - begun.next_angle)
-    # Where a chamber is small, a little of the angle is much of the pressure.
-    volume_1, volume_2 = parts.rest_volumes(plant, begun.next_angle)
-    swept = plant.displacement_per_radian * (plant.angle_max - plant.angle_min)
-    allowed_volume = min(ALLOWED_OF_ANGLE * swept, ALLOWED_BY_GAS * min(volume_1, volume_2))
-    return (bent + missed) * plant.displacement_per_radian / allowed_volume
 
 
 def rebound_velocity(plant: PlantParameters, angular_velocity: float, torque: float) -> float:

@@ -10,6 +10,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.scheme import motion, pneumatics
 from ppafo.engine.step import gas, stated
 from ppafo.engine.step.lane import Lane, Now
+from ppafo.model.plant import direction_of, driving_torque, holds_still, net_torque
 from ppafo.model.ports import at_valve, shown_signals
 
 # Beyond 1e6 rad/s or 1 t of gas a run is lost.
@@ -86,10 +87,9 @@ def measure_part(parts: Program, lane: Lane, now: Now) -> None:
     else:
         until = remaining if hurries else until
     if parts.is_adaptive and parts.angle is None:
-        beginning = time + motion.SAME_INSTANT if parts.shank_jumps else time
-        added = torque_of_leg(parts, lane, beginning, lane.state.angle)
-        lane.begun, until = motion.begin_part(lane.plant, lane.state, added, until, parts=parts.functions)
-    lane.length = until
+        begin_motion(parts, lane, time, until)
+    else:
+        lane.length = until
     lane.remaining = remaining
 
 
@@ -188,6 +188,41 @@ def torque_of_leg(parts: Program, lane: Lane, time: float, angle: float) -> floa
     return torque
 
 
+def begin_motion(parts: Program, lane: Lane, time: float, longest: float) -> None:
+    """Set the predicted part of an unconstrained vane, and its length [s]: ``longest`` [s], or up to a stop.
+
+    The gas then works against the motion that actually happens. A vane at rest slides if the torque exceeds static
+    friction.
+    """
+    plant, angle, velocity = lane.plant, lane.state.angle, lane.state.angular_velocity
+    beginning = time + motion.SAME_INSTANT if parts.shank_jumps else time
+    added = torque_of_leg(parts, lane, beginning, angle)
+    pressure_1, pressure_2 = parts.actuator.pressures(plant, angle, lane.state.mass_1, lane.state.mass_2)
+    torque = driving_torque(plant, parts.actuator.torque(plant, angle, pressure_1, pressure_2), angle) + added
+    friction = motion.friction_now(plant, velocity, pressure_1, pressure_2)
+    stays = holds_still(torque, friction.at_rest, angle <= plant.angle_min, angle >= plant.angle_max)
+    leaving = 0.0 if stays else direction_of(torque)
+    way = direction_of(velocity) if velocity != 0.0 else leaving
+    net = net_torque(torque, way, friction.in_motion, plant.viscous_damping, angle, velocity)
+    acceleration = net / plant.inertia if way != 0.0 else 0.0
+    distance = plant.angle_max - angle if way > 0.0 else angle - plant.angle_min
+    gets_there = velocity * velocity + 2.0 * acceleration * way * distance >= 0.0
+    impact = motion.time_to_stop(distance, abs(velocity), acceleration * way)
+    meets_stop = way != 0.0 and gets_there and impact <= longest
+    length = impact if meets_stop else longest
+    stop = plant.angle_max if way > 0.0 else plant.angle_min
+    # The path at the present acceleration: what it misses is in the error of the part.
+    free_angle = motion.clamp_angle(plant, angle + length * (velocity + 0.5 * length * acceleration))
+    lane.begun = motion.FreePart(
+        way=way,
+        acceleration=acceleration,
+        torque=torque,
+        next_angle=stop if meets_stop else free_angle,
+        meets_stop=1.0 if meets_stop else 0.0,
+    )
+    lane.length = length
+
+
 def slide(parts: Program, lane: Lane, now: Now) -> None:
     """Set the end of the part for a vane that slides on or stays at rest."""
     length = length_of(parts, lane)
@@ -195,17 +230,69 @@ def slide(parts: Program, lane: Lane, now: Now) -> None:
     end = time_of(parts, lane, now) + length
     # Just before a jump that ends the part, as the next one begins just behind it.
     ending = end - motion.SAME_INSTANT if parts.shank_jumps else end
-    added = torque_of_leg(parts, lane, ending, lane.begun.next_angle)
-    lane.slid, lane.moved = motion.slide_part(lane.plant, lane.fed, lane.begun, added, length, parts=parts.functions)
+    plant, begun = lane.plant, lane.begun
+    ahead, velocity = begun.next_angle, lane.fed.angular_velocity
+    added = torque_of_leg(parts, lane, ending, ahead)
+    next_1, next_2 = parts.actuator.pressures(plant, ahead, lane.fed.mass_1, lane.fed.mass_2)
+    next_torque = driving_torque(plant, parts.actuator.torque(plant, ahead, next_1, next_2), ahead) + added
+    next_rate = velocity + begun.acceleration * length
+    friction = motion.friction_now(plant, next_rate, next_1, next_2)
+    net = net_torque(next_torque, begun.way, friction.in_motion, plant.viscous_damping, ahead, next_rate)
+    full_velocity = motion.next_velocity(plant, velocity, begun.acceleration, net, next_rate, length)
+    slides = begun.way != 0.0 and full_velocity * begun.way > 0.0
+    thrown_back = motion.rebound_velocity(plant, full_velocity, next_torque)
+    slid_velocity = thrown_back if begun.meets_stop > 0.5 else full_velocity
+
+    # The sums with 0 are also in ``depart_at``, so that a vane at rest has its bits.
+    place = motion.clamp_angle(plant, lane.fed.angle + 0.0)
+    at_lower, at_upper = place <= plant.angle_min, place >= plant.angle_max
+    stays = holds_still(begun.torque + 0.0 * (next_torque - begun.torque), friction.at_rest, at_lower, at_upper)
+    stays_later = holds_still(next_torque, friction.at_rest, at_lower, at_upper)
+    rests_on = begun.way == 0.0 and stays and stays_later
+    lane.slid = motion.PartSlide(
+        torque=next_torque,
+        friction=friction,
+        angular_velocity=full_velocity,
+        departs=0.0 if slides or rests_on else 1.0,
+    )
+    angle = ahead if slides else place
+    lane.moved = motion.PartEnd(angle, slid_velocity if slides else 0.0, motion_error(parts, lane, angle, length))
 
 
 def depart(parts: Program, lane: Lane) -> None:
-    """Set the end of the part for a vane that reverses or starts to move, which is rare."""
+    """Set the end of the part for a vane that reverses or starts to move, which is rare; otherwise it is unchanged."""
     gas.add(parts, lane)
     length = length_of(parts, lane)
-    lane.moved = motion.depart_part(
-        lane.plant, lane.fed, lane.begun, lane.slid, lane.moved, length, parts=parts.functions
+    begun, slid, velocity = lane.begun, lane.slid, lane.fed.angular_velocity
+    fall = velocity - slid.angular_velocity
+    fraction = velocity / (fall if fall != 0.0 else 1.0) if begun.way != 0.0 else 0.0
+    turning_angle = motion.clamp_angle(lane.plant, lane.fed.angle + 0.5 * fraction * length * velocity)
+    left_torque = begun.torque + fraction * (slid.torque - begun.torque)
+    departure = motion.Departure(fraction, turning_angle, 0.0)
+    angle, rate = motion.depart_at(lane.plant, departure, left_torque, slid.torque, slid.friction, length)
+    error = motion_error(parts, lane, angle, length)
+    departs = slid.departs > 0.5
+    lane.moved = motion.PartEnd(
+        angle=angle if departs else lane.moved.angle,
+        rate=rate if departs else lane.moved.rate,
+        error=error if departs else lane.moved.error,
     )
+
+
+def motion_error(parts: Program, lane: Lane, angle: float, length: float) -> float:
+    """Ratio of the error of the angle at the end of a part [rad] to the allowed error [-]."""
+    plant, begun, slid = lane.plant, lane.begun, lane.slid
+    sliding, damping = slid.friction.in_motion, plant.viscous_damping
+    last = net_torque(slid.torque, begun.way, sliding, damping, begun.next_angle, slid.angular_velocity) / plant.inertia
+    # A change of acceleration over the part bends the path by a sixth of it times the length squared.
+    bent = abs(last - begun.acceleration) * length * length * motion.SIXTH if begun.way != 0.0 else 0.0
+    # The gas worked against a motion that did not happen: that is an error although the vane is where it is.
+    missed = motion.MISSED_FRACTION * abs(angle - begun.next_angle)
+    # Where a chamber is small, a little of the angle is much of the pressure.
+    volume_1, volume_2 = parts.functions.rest_volumes(plant, begun.next_angle)
+    swept = plant.displacement_per_radian * (plant.angle_max - plant.angle_min)
+    allowed_volume = min(motion.ALLOWED_OF_ANGLE * swept, motion.ALLOWED_BY_GAS * min(volume_1, volume_2))
+    return (bent + missed) * plant.displacement_per_radian / allowed_volume
 
 
 # The end.
