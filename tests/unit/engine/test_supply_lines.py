@@ -7,7 +7,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from ppafo.control.profiles import CONSTANT
 from ppafo.engine.lanes import run_batch
+from ppafo.engine.program import Program
 from ppafo.engine.run import Run, batch_of, state_row_numbers
 from ppafo.engine.scheme.actuators import VANE_FUNCTIONS
 from ppafo.engine.scheme.pneumatics import (
@@ -20,7 +22,9 @@ from ppafo.engine.scheme.pneumatics import (
     second_stage,
     with_gas,
 )
-from ppafo.engine.scheme.supply_lines import lines_after, plant_at_line_pressures, with_lines
+from ppafo.engine.step import gas as gas_of_step
+from ppafo.engine.step import lines as lines_of_step
+from ppafo.engine.step.lane import Lane
 from ppafo.model.orifice import orifice_flow
 from ppafo.model.plant import (
     PlantParameters,
@@ -31,6 +35,7 @@ from ppafo.model.plant import (
     single_port_flow,
 )
 from ppafo.model.regulator import LineState, SupplyLines, line_pressures, lines_at_start
+from ppafo.model.valves.proportional import IDEAL
 from ppafo.parameters import load_device
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.plan import plan_run, state_with_volumes
@@ -83,17 +88,20 @@ def filled(plant: PlantParameters, lines: SupplyLines, step: float) -> Filled:
         ),
         lines_at_start(plant, lines),
     )
+    parts = Program(IDEAL, CONSTANT, None, CONSTANT, True, False, feed=lines_of_step)
+    lane = Lane()
+    lane.plant, lane.lines, lane.state, lane.line_state = plant, lines, state, gas
     for _ in range(round(DURATION / step)):
-        ports = open_ports(plant_at_line_pressures(plant, lines, gas))
-        flowing = with_lines(plant, lines, state, flowing_now(plant, state, ports), 1.0, parts=VANE_FUNCTIONS)
-        begun = begin_moving_gas(plant, state, ANGLE, flowing, step, parts=VANE_FUNCTIONS)
-        drawn = (step * begun.first.supplied_1, step * begun.first.supplied_2)
-        between = lines_after(plant, lines, gas, *drawn, 0.0, step)
-        change = end_of(plant, begun, open_ports(plant_at_line_pressures(plant, lines, between.after)), step)
-        drawn = (change.supplied_1, change.supplied_2)
-        gas = lines_after(plant, lines, gas, *drawn, between.inlet_rise, step).after
-        state = with_gas(state, change)
-    return Filled(state, gas)
+        lane.flowing = flowing_now(plant, lane.state, open_ports(lines_of_step.source(parts, lane)))
+        lines_of_step.begin(parts, lane, ANGLE, step)
+        ports = open_ports(lines_of_step.source_ahead(parts, lane))
+        stage = lane.gas_stage
+        lane.passing = gas_flows(plant, stage.end_1, stage.end_2, *ports, single_port_flow).flows
+        gas_of_step.change(parts, lane, step)
+        lines_of_step.end(parts, lane, step)
+        gas_of_step.add(parts, lane)
+        lane.state = lane.fed
+    return Filled(lane.state, lane.line_state)
 
 
 def regulator_flow(set_pressure: float, line_pressure: float, droop: float, largest_flow: float) -> float:

@@ -292,7 +292,7 @@ def motion_error(parts: Program, lane: Lane, angle: float, length: float) -> flo
     volume_1, volume_2 = parts.functions.rest_volumes(plant, begun.next_angle)
     swept = plant.displacement_per_radian * (plant.angle_max - plant.angle_min)
     allowed_volume = min(motion.ALLOWED_OF_ANGLE * swept, motion.ALLOWED_BY_GAS * min(volume_1, volume_2))
-    return (bent + missed) * plant.displacement_per_radian / allowed_volume
+    return float((bent + missed) * plant.displacement_per_radian / allowed_volume)
 
 
 # The end.
