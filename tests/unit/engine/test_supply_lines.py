@@ -11,17 +11,7 @@ from ppafo.control.profiles import CONSTANT
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.program import Program
 from ppafo.engine.run import Run, batch_of, state_row_numbers
-from ppafo.engine.scheme.actuators import VANE_FUNCTIONS
-from ppafo.engine.scheme.pneumatics import (
-    Flows,
-    GasStage,
-    SlopedFlows,
-    begin_moving_gas,
-    gas_change,
-    gas_flows,
-    second_stage,
-    with_gas,
-)
+from ppafo.engine.scheme.pneumatics import SlopedFlows, gas_flows
 from ppafo.engine.step import gas as gas_of_step
 from ppafo.engine.step import lines as lines_of_step
 from ppafo.engine.step.lane import Lane
@@ -74,10 +64,12 @@ def flowing_now(plant: PlantParameters, state: PlantState, ports: tuple[SinglePo
     return gas_flows(plant, *pressures, *ports, single_port_flow)
 
 
-def end_of(plant: PlantParameters, begun: GasStage, ports: tuple[SinglePort, SinglePort], step: float) -> Flows:
-    """What a step [s] adds [kg], from its first stage."""
-    flowing = gas_flows(plant, begun.end_1, begun.end_2, *ports, single_port_flow).flows
-    return gas_change(plant, begun.first, second_stage(begun, begun.drift, flowing), step)
+def end_step(parts: Program, lane: Lane, ports: tuple[SinglePort, SinglePort], step: float) -> None:
+    """Set what a step [s] adds [kg], from its first stage."""
+    stage = lane.gas_stage
+    lane.passing = gas_flows(lane.plant, stage.end_1, stage.end_2, *ports, single_port_flow).flows
+    gas_of_step.change(parts, lane, step)
+    gas_of_step.add(parts, lane)
 
 
 def filled(plant: PlantParameters, lines: SupplyLines, step: float) -> Filled:
@@ -94,12 +86,8 @@ def filled(plant: PlantParameters, lines: SupplyLines, step: float) -> Filled:
     for _ in range(round(DURATION / step)):
         lane.flowing = flowing_now(plant, lane.state, open_ports(lines_of_step.source(parts, lane)))
         lines_of_step.begin(parts, lane, ANGLE, step)
-        ports = open_ports(lines_of_step.source_ahead(parts, lane))
-        stage = lane.gas_stage
-        lane.passing = gas_flows(plant, stage.end_1, stage.end_2, *ports, single_port_flow).flows
-        gas_of_step.change(parts, lane, step)
+        end_step(parts, lane, open_ports(lines_of_step.source_ahead(parts, lane)), step)
         lines_of_step.end(parts, lane, step)
-        gas_of_step.add(parts, lane)
         lane.state = lane.fed
     return Filled(lane.state, lane.line_state)
 
@@ -178,17 +166,16 @@ def test_what_came_through_is_in_lines_and_chambers(step: float) -> None:
 
 
 def test_without_droop_and_limit_a_filling_is_that_of_a_constant_supply() -> None:
-    plant, step = device(), 2.5e-4
-    ports, state = (
-        open_ports(plant),
-        state_with_volumes(
-            plant, ANGLE, 0.0, *chamber_volumes(plant, ANGLE), plant.atmospheric_pressure, plant.atmospheric_pressure
-        ),
-    )
+    plant, step, parts, lane = device(), 2.5e-4, Program(IDEAL, CONSTANT, None, None, True, False), Lane()
+    room = plant.atmospheric_pressure
+    lane.plant, ports = plant, open_ports(plant)
+    lane.state = state_with_volumes(plant, ANGLE, 0.0, *chamber_volumes(plant, ANGLE), room, room)
     for _ in range(round(DURATION / step)):
-        flowing = flowing_now(plant, state, ports)
-        begun = begin_moving_gas(plant, state, ANGLE, flowing, step, parts=VANE_FUNCTIONS)
-        state = with_gas(state, end_of(plant, begun, ports, step))
+        lane.flowing = flowing_now(plant, lane.state, ports)
+        gas_of_step.begin(parts, lane, ANGLE, step)
+        end_step(parts, lane, ports, step)
+        lane.state = lane.fed
+    state = lane.state
     ideal = np.array(chamber_pressures(plant, ANGLE, state.mass_1, state.mass_2))
     away = []
     for droop in (1.0e7, 1.0e6, 1.0e5, 1.0):

@@ -4,11 +4,11 @@ The method is ROS2 of Verwer, Spee, Blom and Hundsdorfer (SIAM J. Sci. Comput. 2
 the exact Jacobian and the time derivative due to the moving volumes, which change linearly through the step. Gas totals
 are integrated by the same method as further unknowns, so that mass is conserved to rounding.
 
-Order of a step: the flows at the start with their derivatives (``gas_flows``), the first stage (``begin_still_gas``,
-``begin_moving_gas``), the flows at the pressures after the first stage, the second stage, and the
-changes by both stages. The flows of many runs are computed in short loops of their own, because a division or a square
-root has a long latency and the processor overlaps several runs meanwhile. The first stage alone is a step of first
-order, and the contribution of the second stage is the error estimate.
+Order of a step: the flows at the start with their derivatives (``gas_flows``), the first stage, the flows at the
+pressures after the first stage, the second stage, and the changes by both stages. The flows of many runs are computed
+in short loops of their own, because a division or a square root has a long latency and the processor overlaps several
+runs meanwhile. The first stage alone is a step of first order, and the contribution of the second stage is the error
+estimate.
 """
 
 from collections.abc import Callable
@@ -214,62 +214,6 @@ def inverse_determinant(a: float, b: float, c: float, d: float) -> float:
     return 1.0 / (a * d - b * c)
 
 
-def begin_still_gas(
-    plant: PlantParameters,
-    state: PlantState,
-    held: HeldChambers,
-    flowing: SlopedFlows,
-    step: float,
-    *,
-    parts: ActuatorFunctions,
-) -> GasStage:
-    """First stage of one step [s] with a vane at rest."""
-    linear = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
-    scale = inverse_determinant(linear.a, linear.b, linear.c, linear.d)
-    first = solve_stage(linear, scale, flow_rates(flowing.flows))
-    # Pressures as in a step with moving volumes: a locked joint has the bits of an exported plant at rest.
-    ended = state._replace(mass_1=state.mass_1 + step * first.mass_1, mass_2=state.mass_2 + step * first.mass_2)
-    end_1, end_2 = parts.held_pressures(plant, held, ended)
-    return GasStage(linear=linear, scale=scale, first=first, drift=STILL, end_1=end_1, end_2=end_2)
-
-
-def begin_moving_gas(
-    plant: PlantParameters,
-    state: PlantState,
-    next_angle: float,
-    flowing: SlopedFlows,
-    step: float,
-    *,
-    parts: ActuatorFunctions,
-) -> GasStage:
-    """First stage of one step [s] with volumes that change linearly up to ``next_angle`` [rad].
-
-    Mass responds to pressure in proportion to ``V + p dV/dp``: a compliant chamber takes up more gas.
-    """
-    pressure_1, pressure_2 = parts.pressures(plant, state.angle, state.mass_1, state.mass_2)
-    # Volumes at both angles at one pressure: the drift is what the angle alone does.
-    here = parts.chambers(plant, state.angle, pressure_1, pressure_2)
-    ahead = parts.chambers(plant, next_angle, pressure_1, pressure_2)
-    room_1 = here.volume_1 + pressure_1 * here.compliance_1
-    room_2 = here.volume_2 + pressure_2 * here.compliance_2
-    # One division, as in ``pressures_per_mass``.
-    per_rooms = plant.gas_product / (room_1 * room_2)
-    linear = linearise(room_2 * per_rooms, room_1 * per_rooms, flowing, step)
-    # A growing volume lowers the pressure as a loss of mass at this rate would; parts of a step may have no length.
-    per_duration = 1.0 / (plant.gas_product * max(step, SHORTEST))
-    drift = response(
-        linear,
-        pressure_1 * (here.volume_1 - ahead.volume_1) * per_duration,
-        pressure_2 * (here.volume_2 - ahead.volume_2) * per_duration,
-    )
-    scale = inverse_determinant(linear.a, linear.b, linear.c, linear.d)
-    first = solve_stage(linear, scale, added_flows(flow_rates(flowing.flows), drift))
-    end_1, end_2 = parts.pressures(
-        plant, next_angle, state.mass_1 + step * first.mass_1, state.mass_2 + step * first.mass_2
-    )
-    return GasStage(linear=linear, scale=scale, first=first, drift=drift, end_1=end_1, end_2=end_2)
-
-
 def second_right(flows: Flows, first: Flows, drift: Flows) -> Flows:
     """Right-hand sides of the second stage [kg/s]: the flows after the first, less twice that stage and the drift."""
     return Flows(
@@ -279,11 +223,6 @@ def second_right(flows: Flows, first: Flows, drift: Flows) -> Flows:
         supplied_2=flows.supplied_2 - 2.0 * first.supplied_2 - drift.supplied_2,
         leaked=flows.leaked - 2.0 * first.leaked - drift.leaked,
     )
-
-
-def second_stage(begun: GasStage, drift: Flows, flowing: GasFlows) -> Flows:
-    """Slopes of the second stage [kg/s], from the flows after the first."""
-    return solve_stage(begun.linear, begun.scale, second_right(flow_rates(flowing), begun.first, drift))
 
 
 def of_both_stages(first: float, second: float, step: float) -> float:
@@ -314,12 +253,6 @@ def kept_gas(plant: PlantParameters, first: Flows, second: Flows, step: float) -
     """Gas [kg] that either supply did not take back in one step [s], from both stages."""
     kept_1 = refused_backflow(plant, of_both_stages(first.supplied_1, second.supplied_1, step))
     return kept_1, refused_backflow(plant, of_both_stages(first.supplied_2, second.supplied_2, step))
-
-
-def gas_change(plant: PlantParameters, first: Flows, second: Flows, step: float) -> Flows:
-    """Changes [kg] in one step [s], from both stages."""
-    kept_1, kept_2 = kept_gas(plant, first, second, step)
-    return change_by_stages(first, second, step, kept_1, kept_2)
 
 
 def with_gas(state: PlantState, gas: Flows) -> PlantState:
@@ -365,22 +298,6 @@ def pressure_error(
     content_1 = volume_1 * pressure_that_matters(plant, end_1)
     content_2 = volume_2 * pressure_that_matters(plant, end_2)
     return weight * step * plant.gas_product * larger_share(abs(rate_1), content_1, abs(rate_2), content_2)
-
-
-def gas_error(
-    plant: PlantParameters, begun: GasStage, second: Flows, next_angle: float, step: float, *, parts: ActuatorFunctions
-) -> float:
-    """Ratio of the estimated error of both pressures at the end of a step [s] to the allowed error [-].
-
-    The estimate is the contribution of the second stage, damped once by the matrix of the step, so that a settled
-    chamber does not require short steps. Gas that a supply without relief would have taken back inside the step is
-    added.
-    """
-    refused_1, refused_2 = kept_gas(plant, begun.first, second, 1.0)
-    # Damped by the matrix once, not twice: the estimate stays above the error that it stands for.
-    damped = solve_stage(begun.linear, begun.scale, added_flows(begun.first, second))
-    missed_1, missed_2 = abs(damped.mass_1) + refused_1, abs(damped.mass_2) + refused_2
-    return pressure_error(plant, OF_STAGES, missed_1, missed_2, begun.end_1, begun.end_2, next_angle, step, parts=parts)
 
 
 def larger_share(part_1: float, whole_1: float, part_2: float, whole_2: float) -> float:

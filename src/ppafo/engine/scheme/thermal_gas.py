@@ -26,22 +26,14 @@ from typing import NamedTuple
 
 from ppafo.engine.scheme.pneumatics import (
     GAMMA,
-    OF_STAGES,
-    SHORTEST,
     Flows,
     GasFlows,
     Linearisation,
     SlopedFlows,
     added_flows,
-    change_by_stages,
     flow_rates,
-    inverse_determinant,
-    kept_gas,
     linearise,
-    of_both_stages,
-    pressure_error,
     response,
-    second_right,
     with_gas,
 )
 from ppafo.model.gas import enthalpy_flow_ratio, mass_flow_ratio
@@ -379,133 +371,6 @@ def warm_chambers(
         growth_2=(ahead.volume_2 - here.volume_2) * rate,
         give_1=pressure_1 * now.compliance_1 / now.volume_1,
         give_2=pressure_2 * now.compliance_2 / now.volume_2,
-    )
-
-
-def begin_thermal_gas(
-    plant: PlantParameters,
-    thermal: ThermalParameters,
-    state: PlantState,
-    masses: ThermalState,
-    next_angle: float,
-    flowing: SlopedFlows,
-    step: float,
-    *,
-    parts: ActuatorFunctions,
-) -> ThermalStage:
-    """First stage of one step [s] with an energy balance; volumes change linearly up to ``next_angle`` [rad]."""
-    rate = 1.0 / max(step, SHORTEST)
-    pressure_1, pressure_2 = parts.pressures(plant, state.angle, state.mass_1, state.mass_2)
-    at = warm_chambers(plant, pressure_1, pressure_2, state.angle, state.angle, next_angle, rate, parts=parts)
-    gas = WarmGas(state.mass_1, state.mass_2, masses.mass_1, masses.mass_2)
-    linear = thermal_matrix(plant, thermal, gas, at, flowing, step)
-    # A growing volume lowers the pressure as a loss of content at this rate would.
-    lost_1, lost_2 = -state.mass_1 * at.growth_1 / at.volume_1, -state.mass_2 * at.growth_2 / at.volume_2
-    flows = thermal_flows(thermal, gas, at, flowing.flows)
-    scale = inverse_determinant(linear.a, linear.b, linear.c, linear.d)
-    first = solve_thermal_stage(linear, scale, added_thermal_flows(flows, thermal_response(linear, lost_1, lost_2)))
-    end = WarmGas(
-        content_1=state.mass_1 + step * first.mass_1,
-        content_2=state.mass_2 + step * first.mass_2,
-        mass_1=masses.mass_1 + step * first.gas.mass_1,
-        mass_2=masses.mass_2 + step * first.gas.mass_2,
-    )
-    end_1, end_2 = parts.pressures(plant, next_angle, end.content_1, end.content_2)
-    return ThermalStage(
-        linear=linear,
-        scale=scale,
-        first=first,
-        lost_1=lost_1,
-        lost_2=lost_2,
-        gas=end,
-        at=warm_chambers(plant, end_1, end_2, next_angle, state.angle, next_angle, rate, parts=parts),
-        end_1=end_1,
-        end_2=end_2,
-    )
-
-
-def second_thermal_stage(thermal: ThermalParameters, begun: ThermalStage, flowing: GasFlows) -> ThermalFlows:
-    """Slopes of the second stage [kg/s] of a step with an energy balance."""
-    flows, first = thermal_flows(thermal, begun.gas, begun.at, flowing), begun.first
-    drift = thermal_response(begun.linear, begun.lost_1, begun.lost_2)
-    right = ThermalFlows(
-        mass_1=flows.mass_1 - 2.0 * first.mass_1 - drift.mass_1,
-        mass_2=flows.mass_2 - 2.0 * first.mass_2 - drift.mass_2,
-        gas=second_right(flows.gas, first.gas, drift.gas),
-        energy=second_right(flows.energy, first.energy, drift.energy),
-        heat=flows.heat - 2.0 * first.heat,
-    )
-    return solve_thermal_stage(begun.linear, begun.scale, right)
-
-
-def thermal_change(
-    plant: PlantParameters, thermal: ThermalParameters, begun: ThermalStage, second: ThermalFlows, step: float
-) -> ThermalFlows:
-    """Changes [kg] in one step [s] from both stages; supplies without relief are treated as in ``gas_change``."""
-    first = begun.first
-    kept_1, kept_2 = kept_gas(plant, first.gas, second.gas, step)
-    carries = enthalpy_flow_ratio(1.0, thermal.heat_capacity_ratio)
-    warm_1, warm_2 = kept_1 * carries, kept_2 * carries
-    return ThermalFlows(
-        mass_1=of_both_stages(first.mass_1, second.mass_1, step) + begun.linear.kept_1 * warm_1,
-        mass_2=of_both_stages(first.mass_2, second.mass_2, step) + begun.linear.kept_2 * warm_2,
-        gas=change_by_stages(first.gas, second.gas, step, kept_1, kept_2),
-        energy=change_by_stages(first.energy, second.energy, step, warm_1, warm_2),
-        heat=of_both_stages(first.heat, second.heat, step),
-    )
-
-
-def thermal_error(
-    plant: PlantParameters,
-    begun: ThermalStage,
-    second: ThermalFlows,
-    next_angle: float,
-    step: float,
-    *,
-    parts: ActuatorFunctions,
-) -> float:
-    """Estimated error of pressures and temperatures after a step [s] divided by the allowed error, as ``gas_error``.
-
-    In a chamber that is flushed within a step, the pressure is settled but the temperature is not.
-    """
-    added, held = solve_thermal_stage(begun.linear, begun.scale, added_thermal_flows(begun.first, second)), begun.gas
-    pressed = pressure_error(
-        plant, OF_STAGES, added.mass_1, added.mass_2, begun.end_1, begun.end_2, next_angle, step, parts=parts
-    )
-    # The temperature over the reference is content over mass: what a little of both changes it by.
-    warmer_1 = (added.mass_1 - held.content_1 / held.mass_1 * added.gas.mass_1) / held.mass_1
-    warmer_2 = (added.mass_2 - held.content_2 / held.mass_2 * added.gas.mass_2) / held.mass_2
-    return max(pressed, 0.5 / ALLOWED_OF_TEMPERATURE * step * max(abs(warmer_1), abs(warmer_2)))
-
-
-def after_motion(
-    plant: PlantParameters,
-    thermal: ThermalParameters,
-    state: PlantState,
-    assumed_angle: float,
-    angle: float,
-    *,
-    parts: ActuatorFunctions,
-) -> PlantState:
-    """State after isentropic correction of the gas from the assumed angle [rad] to the angle reached [rad]."""
-    ratio = thermal.heat_capacity_ratio
-    pressure_1, pressure_2 = parts.pressures(plant, assumed_angle, state.mass_1, state.mass_2)
-    assumed = parts.chambers(plant, assumed_angle, pressure_1, pressure_2)
-    turned = parts.chambers(plant, angle, pressure_1, pressure_2)
-    # The isentrope k P dV = -V dP, of which the wall's part goes with the pressure: the pressure there, then the work.
-    reached_1 = pressure_1 - ratio * pressure_1 * (turned.volume_1 - assumed.volume_1) / (
-        assumed.volume_1 + ratio * pressure_1 * assumed.compliance_1
-    )
-    reached_2 = pressure_2 - ratio * pressure_2 * (turned.volume_2 - assumed.volume_2) / (
-        assumed.volume_2 + ratio * pressure_2 * assumed.compliance_2
-    )
-    reached = parts.chambers(plant, angle, reached_1, reached_2)
-    half = 0.5 * (ratio - 1.0)
-    mean_1, mean_2 = 0.5 * (reached.volume_1 + assumed.volume_1), 0.5 * (reached.volume_2 + assumed.volume_2)
-    work_1, work_2 = half * (reached.volume_1 - assumed.volume_1), half * (reached.volume_2 - assumed.volume_2)
-    return state._replace(
-        mass_1=state.mass_1 * (mean_1 - work_1) / (mean_1 + work_1),
-        mass_2=state.mass_2 * (mean_2 - work_2) / (mean_2 + work_2),
     )
 
 

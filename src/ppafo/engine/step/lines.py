@@ -81,7 +81,7 @@ def end(parts: Program, lane: Lane, length: float) -> None:
 
 
 def error(parts: Program, lane: Lane) -> float:
-    """Return the error of both line pressures divided by the allowed error [-], as ``gas_error``.
+    """Return the error of both line pressures divided by the allowed error [-].
 
     The first stage is of first order; the error is half the change by the second.
     """
