@@ -255,3 +255,14 @@ def test_the_torque_reaches_as_far_as_the_set_pressures() -> None:
     assert torque_reach(scenario.device, angle)[1] == pytest.approx(highest)
     assert available_torque(scenario)[1] == pytest.approx(highest)
     assert supply_for(scenario.device, angle, 1.01 * highest) is None
+
+
+def test_a_pressure_below_the_lowest_set_one_is_the_cause_where_it_lasts() -> None:
+    for start, level, follows in (("0 bar_g", "2 bar_g", True), ("2 bar_g", "0.02 bar_g", False)):
+        reference = {"of": "pressure_1", "kind": "ramp_hold", "start_level": start, "level": level}
+        lowest = "valve.lowest_pressure=0.4 bar_g"
+        scenario = regulated(LOCKED, {"kind": "pid"}, {**reference, "ramp_time": "1 s"}, lowest, duration="3 s")
+        verdict = tried(scenario, simulate(scenario).tracking)
+        assert verdict.follows is follows
+    assert verdict.cause.startswith("the regulator sets no less than `valve.lowest_pressure = 0.4 bar_g`")
+    assert "valve.lowest_pressure=0.02 bar_g'] it follows" in verdict.tried

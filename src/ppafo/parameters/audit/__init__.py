@@ -19,7 +19,12 @@ from ppafo.parameters.audit.changes import changes
 from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence, NamedValue, Severity
 from ppafo.parameters.audit.inertia import check_inertia
 from ppafo.parameters.audit.orifices import check_bores, check_flow, check_orifices
-from ppafo.parameters.audit.torque import check_published_torque, check_torque_ceiling, check_vacuum
+from ppafo.parameters.audit.torque import (
+    check_published_torque,
+    check_set_pressures,
+    check_torque_ceiling,
+    check_vacuum,
+)
 from ppafo.parameters.audit.values import (
     check_choked_flow,
     check_contradictions,
@@ -54,6 +59,7 @@ CHECKS: dict[str, Callable[[Evidence], Iterator[AuditFinding]]] = {
     "stroke": check_stroke,
     "filling": check_filling,
     "vacuum": check_vacuum,
+    "set pressures": check_set_pressures,
     "torque ceiling": check_torque_ceiling,
     "published torque": check_published_torque,
     "ideal gas": check_ideal_gas,

@@ -110,6 +110,23 @@ def check_vacuum(evidence: Evidence) -> Iterator[AuditFinding]:
         )
 
 
+def check_set_pressures(evidence: Evidence) -> Iterator[AuditFinding]:
+    """Yield a note on each pressure regulator that can be set above its supply, with the command from which it is."""
+    for name in evidence.parameter_set.valve_kinds:
+        paths = (f"valves.{name}.lowest_pressure", f"valves.{name}.highest_pressure", _SUPPLIES[0])
+        numbers = evidence.numbers(*paths)
+        if numbers is None or not numbers[0] < numbers[2] < numbers[1]:
+            continue
+        share = (numbers[2] - numbers[0]) / (numbers[1] - numbers[0])
+        yield AuditFinding(
+            id=f"set-pressure-of-{name}",
+            severity="note",
+            title=f"valve '{name}' can be set above its supply: beyond a command of {share:.2g} it gives no more",
+            values=evidence.values_of(*paths),
+            sides=(ComparedNumber("command that sets the supply pressure", share, "1"),),
+        )
+
+
 def check_published_torque(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield findings on published torques: comparison with the torque at supply pressure, filling time in walking.
 

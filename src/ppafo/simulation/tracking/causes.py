@@ -22,6 +22,7 @@ from ppafo.simulation.torque_loop import LoopParts, quicker_at
 from ppafo.simulation.tracking.case import Case, TrackingCause, only_opens_fully
 from ppafo.simulation.tracking.load_causes import (
     ONE_WAY,
+    below_lowest_set_pressure,
     flung_at_start,
     load_beyond_reach,
     reach_at_samples,
@@ -504,6 +505,7 @@ CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     # What lacks more than the reach takes has another cause before it.
     lambda case: torque_beyond_reach(case) if case.is_for_reach else None,
     load_beyond_reach,
+    below_lowest_set_pressure,
     flung_at_start,
     # No gains follow what moves on in the dead time by more than any lag that is allowed.
     lambda case: _late_device(case, LARGEST_LAG),

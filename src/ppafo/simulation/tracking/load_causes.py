@@ -15,7 +15,7 @@ from ppafo.model.plant import gravity_torque
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import PRESSURE_PATH
 from ppafo.parameters.reach import static_torque, supply_for, supply_that_moves, torque_reach
-from ppafo.simulation.numbers import number_at
+from ppafo.simulation.numbers import declared_numbers, number_at
 from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.tracking.case import Case, TrackingCause
@@ -24,6 +24,7 @@ from ppafo.simulation.tracking.remedies import (
     change_text,
     level_text,
     remedy,
+    stated_number,
     stiffened,
     stiffer_laws,
     torque_asked,
@@ -136,7 +137,9 @@ def torque_beyond_reach(case: Case) -> TrackingCause | None:
     supply = supply_that_moves(device, worst.upwards)
     stop = stop_of(scenario, case.recording["angle"][case.samples]) if isinstance(scenario.motion, FreeMotion) else ""
     lies = f"only the {stop} stop, on which the joint lies, resists the torque: " if stop else ""
-    filled = float(device.highest_pressures[supply != PRESSURE_PATH])
+    # What always pushes gives least where its chamber is vented.
+    pushes = worst.reach > 0.0 and not worst.upwards
+    filled = float(device.lowest_pressure if pushes else device.highest_pressures[supply != PRESSURE_PATH])
     text = (
         f"{lies}at {level_text('rad', worst.angle)} and {level_text('Pa', filled)} the "
         f"actuator gives {reach_text(worst.reach, worst.upwards)}"
@@ -146,6 +149,8 @@ def torque_beyond_reach(case: Case) -> TrackingCause | None:
     lacking = [peak for peak in peaks if peak.lacking > 0.0]
     torques = [(supply_that_moves(device, peak.upwards), peak.angle, peak.wanted) for peak in lacking]
     changes = _supplies_for(device, torques, _MARGINS)
+    if pushes and "lowest_pressure" in device.valve.settings:
+        changes.append({"valve.lowest_pressure": float(device.supply.atmospheric_pressure)})
     if "amplitude" in scenario.reference.settings:
         level = float(scenario.reference.settings["level"])
         changes.append({"reference.amplitude": min(abs(_WITHIN * peak.reach - level) for peak in peaks)})
@@ -155,6 +160,23 @@ def torque_beyond_reach(case: Case) -> TrackingCause | None:
     is_long = settled.rests or settled.reference_periods >= FEWEST_PERIODS
     longer = {} if is_long else {"run.duration": scenario.run.duration / settled.reference_periods}
     return TrackingCause(text, tuple(remedy(scenario, {**each, **longer}) for each in changes))
+
+
+def below_lowest_set_pressure(case: Case) -> TrackingCause | None:
+    """Cause: the reference of a chamber's pressure is below the lowest pressure that its regulator can be set to."""
+    scenario, path = case.scenario, "valve.lowest_pressure"
+    lowest, asked = scenario.device.lowest_pressure, float(np.min(followed(case.recording)[0][case.samples]))
+    # A difference, a torque and an angle have their reach from both chambers.
+    is_level = scenario.controlled in ("pressure_1", "pressure_2") and path in declared_numbers(scenario)
+    if not is_level or asked >= lowest or case.settled.mean_error <= 0.0:
+        return None
+    changes = [{path: asked}]
+    if PROFILES[scenario.reference.kind].is_monotone:
+        changes.append({"reference.level": float(lowest)})
+    text = (
+        f"the regulator sets no less than {stated_number(scenario, path)}, and {level_text('Pa', asked)} is asked for"
+    )
+    return TrackingCause(text, tuple(remedy(scenario, each) for each in changes))
 
 
 def load_beyond_reach(case: Case) -> TrackingCause | None:

@@ -101,6 +101,13 @@ def test_a_demand_above_the_ceiling_is_a_warning_with_the_pressure_that_is_neede
     assert "59.97 psi_g" in finding.paragraph
 
 
+def test_a_regulator_that_can_be_set_above_its_supply_says_from_which_command_on() -> None:
+    path, name = "valves.pressure_regulator.highest_pressure", "set-pressure-of-pressure_regulator"
+    finding = _of_set("cylinder-lever", f"{path}=9 bar_g")[name]
+    assert side(finding, "command that sets the supply pressure") == pytest.approx((5.0 - 0.05) / (9.0 - 0.05))
+    assert name not in _of_set("cylinder-lever")
+
+
 def test_static_friction_above_the_ceiling_is_an_error() -> None:
     assert findings("friction.static_torque=9 N m")["torque-ceiling"].severity == "error"
 
