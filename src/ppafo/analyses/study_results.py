@@ -190,15 +190,11 @@ class StudyResults:
         """Return a column by name of the configuration, thinned to every n-th run for about ``maximum`` runs in all."""
         # An odd step: an even one would see one half of a grid whose last axis has two values.
         step = -(-int(self.document["runs"]) // maximum) | 1
-        return {name: self.column(name, column)[::step] for name in self.configurations}
-
-    def column(self, configuration: str, column: str) -> np.ndarray[Any, Any]:
-        """Return a column of the runs of a configuration."""
-        return np.concatenate([table.column(column).to_numpy() for table in self.chunks([column], configuration)])
+        return {name: values[::step] for name, values in self.by_configuration(column).items()}
 
     def known(self, configuration: str, column: str) -> Floats:
         """Return the finite values of a column of the runs of a configuration."""
-        values = self.column(configuration, column)
+        values = np.concatenate([part.column(column).to_numpy() for part in self.chunks([column], configuration)])
         return np.asarray(values[np.isfinite(values)])
 
     def chunks(self, columns: Sequence[str] | None = None, configuration: str | None = None) -> "Iterator[pa.Table]":

@@ -54,6 +54,8 @@ def tune(
     pid-gains: objective 1 before, 0.008313 after (-99.2 %)
     """
     name_plugins(plugins)
+    from dataclasses import replace
+
     from ppafo.analyses.tuning import Problem, load_tuning, solve_tuning
     from ppafo.errors import StudyError
     from ppafo.study.executing import executor_of
@@ -62,5 +64,7 @@ def tune(
         raise StudyError("overrides: not allowed with a loaded Problem; give them to load_tuning")
     problem = tuning if isinstance(tuning, Problem) else load_tuning(tuning, overrides)
     if seed is not None:
-        problem = problem.with_seed(seed)
+        # Noise alone follows the seed of the search; draws of a study keep the seed of the study.
+        effort = problem.effort.model_copy(update={"seed": seed})
+        problem = replace(problem, effort=effort, seed=problem.seed if problem.study else seed)
     return solve_tuning(problem, threads, progress, executor_of(executor))

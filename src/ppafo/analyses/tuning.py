@@ -244,12 +244,6 @@ class Problem:
         """Return name, scenario and searched parameters."""
         return f"Tuning '{self.name}' of '{self.scenario.name}': {', '.join(gain.path for gain in self.searched)}"
 
-    def with_seed(self, seed: int) -> "Problem":
-        """Return the problem with another random seed of the search."""
-        # Noise alone follows the seed of the search; draws of a study keep the seed of the study.
-        effort = self.effort.model_copy(update={"seed": seed})
-        return replace(self, effort=effort, seed=self.seed if self.study else seed)
-
     @property
     def measure(self) -> str:
         """Statistic of the draws by which candidates are evaluated, in words."""
@@ -524,7 +518,17 @@ def solve_tuning(
     runs = scenario_runs(problem.scenario, metrics, counter, problem.gauge, threads, executor)
     draws = {} if uncertainty is None else uncertainty.random_columns(0, problem.draws, problem.seed)
     tried = _tried(runs, problem, {path: [value] for path, value in problem.before.items()}, draws)
-    scales = {goal.metric: _scale(problem, goal, tried) for goal in problem.goals}
+    scales = dict[str, float]()
+    for goal in problem.goals:
+        # By default each goal is 1 before tuning: goals in different units then weigh as much as their weights say.
+        before_tuning = problem.bad_end(tried[f"judged_{goal.metric}"], goal.weight > 0.0)
+        scale = abs(float(before_tuning[0])) if goal.scale is None else goal.scale
+        if not np.isfinite(scale) or scale == 0.0:
+            raise StudyError(
+                f"tuning '{problem.name}': objective '{goal.metric}' is {scale:g} before tuning, which cannot be its "
+                "scale; set scale = 'VALUE UNIT' in this objective"
+            )
+        scales[goal.metric] = scale
 
     def costs(fractions: Floats) -> Floats:
         # As they are pasted: what keeps a constraint by less than the last digit would break it.
@@ -576,20 +580,6 @@ def _tried(
     return {name: column.reshape(candidates, count) for name, column in found.items()}
 
 
-def _scale(problem: Problem, goal: ObjectiveTerm, before: Rows) -> float:
-    """Return the scale of a goal: the given one, or the value of the metric before tuning."""
-    # By default each goal is 1 before tuning: goals in different units then weigh as much as their weights say.
-    scale = goal.scale
-    if scale is None:
-        scale = abs(float(problem.bad_end(before[f"judged_{goal.metric}"], goal.weight > 0.0)[0]))
-    if not np.isfinite(scale) or scale == 0.0:
-        raise StudyError(
-            f"tuning '{problem.name}': objective '{goal.metric}' is {scale:g} before tuning, which cannot be its "
-            "scale; set scale = 'VALUE UNIT' in this objective"
-        )
-    return scale
-
-
 def judge(rows: Rows, problem: Problem, scales: Mapping[str, float]) -> Rows:
     """Score candidates, each (candidates,), by objective, constraints, tracking and runs without a value.
 
@@ -626,67 +616,62 @@ def search(costs: Callable[[Floats], Floats], before: Sequence[float], effort: S
     first candidates if they lie within the bounds. The search is differential evolution (Storn and Price, 1997) as in
     SciPy, followed by the simplex method of Nelder and Mead (1965). Both use only comparisons of costs.
     """
-    seeds = np.random.SeedSequence(effort.seed).spawn(effort.starts)
-    finished = [_search_from_start(costs, before, effort, np.random.default_rng(seed)) for seed in seeds]
-    return sorted(finished, key=lambda start: start.cost)
-
-
-def _search_from_start(
-    costs: Callable[[Floats], Floats], before: Sequence[float], effort: SearchEffort, random: np.random.Generator
-) -> SearchStart:
-    """Return the result of one start: differential evolution, then a simplex around its best candidate."""
     from scipy.optimize import differential_evolution, minimize
 
-    batches, box = list[Floats](), [(0.0, 1.0)] * len(before)
+    starts, batches, box = list[SearchStart](), list[Floats](), [(0.0, 1.0)] * len(before)
 
     def batch_costs(columns: Floats) -> Floats:
         # SciPy has a candidate in each column, the costs one in each row.
         batches.append(costs(np.clip(np.atleast_2d(columns.T), 0.0, 1.0)))
         return batches[-1]
 
-    evolved = differential_evolution(
-        batch_costs,
-        box,
-        # SciPy refuses a first candidate beyond the bounds.
-        x0=np.asarray(before) if all(0.0 <= fraction <= 1.0 for fraction in before) else None,
-        init="latinhypercube",
-        popsize=effort.candidates_per_gain,
-        maxiter=effort.generations,
-        # No test of SciPy's own: ``_is_settled`` decides, which knows what a broken constraint adds to the costs.
-        tol=0.0,
-        callback=lambda intermediate_result: _is_settled(intermediate_result.population_energies),
-        # SciPy's polishing would take derivatives of a cost that jumps where a constraint breaks.
-        polish=False,
-        # A whole generation at a time, so that it is one ensemble.
-        updating="deferred",
-        vectorized=True,
-        rng=random,
-    )
-    generations = len(batches)
-    # In a flat valley generations come to within a hundredth of the best, and hardly nearer.
-    size = np.clip(np.std(evolved.population, axis=0), *_SIMPLEX_SIZES)
-    corners = [evolved.x, *(evolved.x + np.diag(np.where(evolved.x + size > 1.0, -size, size)))]
-    refined = minimize(
-        lambda fractions: float(batch_costs(fractions[:, None])[0]),
-        evolved.x,
-        method="Nelder-Mead",
-        bounds=box,
-        options={
-            "initial_simplex": np.array(corners),
-            "maxfev": _REFINEMENTS * len(before),
-            "xatol": _TOLERANCE,
-            "fatol": _TOLERANCE * _TOLERANCE * abs(float(evolved.fun)),
-        },
-    )
-    best = np.minimum.accumulate([np.min(batch) for batch in batches]).tolist()
-    return SearchStart(
-        fractions=tuple(map(float, refined.x)),
-        cost=float(refined.fun),
-        candidates=sum(map(len, batches)),
-        # The simplex adds one cost, where it ended.
-        generations=(*best[:generations], best[-1]),
-        is_settled=_is_settled(evolved.population_energies),
-    )
+    for seed in np.random.SeedSequence(effort.seed).spawn(effort.starts):
+        batches.clear()
+        evolved = differential_evolution(
+            batch_costs,
+            box,
+            # SciPy refuses a first candidate beyond the bounds.
+            x0=np.asarray(before) if all(0.0 <= fraction <= 1.0 for fraction in before) else None,
+            init="latinhypercube",
+            popsize=effort.candidates_per_gain,
+            maxiter=effort.generations,
+            # No test of SciPy's own: ``_is_settled`` decides, which knows what a broken constraint adds to the costs.
+            tol=0.0,
+            callback=lambda intermediate_result: _is_settled(intermediate_result.population_energies),
+            # SciPy's polishing would take derivatives of a cost that jumps where a constraint breaks.
+            polish=False,
+            # A whole generation at a time, so that it is one ensemble.
+            updating="deferred",
+            vectorized=True,
+            rng=np.random.default_rng(seed),
+        )
+        generations = len(batches)
+        # In a flat valley generations come to within a hundredth of the best, and hardly nearer.
+        size = np.clip(np.std(evolved.population, axis=0), *_SIMPLEX_SIZES)
+        corners = [evolved.x, *(evolved.x + np.diag(np.where(evolved.x + size > 1.0, -size, size)))]
+        refined = minimize(
+            lambda fractions: float(batch_costs(fractions[:, None])[0]),
+            evolved.x,
+            method="Nelder-Mead",
+            bounds=box,
+            options={
+                "initial_simplex": np.array(corners),
+                "maxfev": _REFINEMENTS * len(before),
+                "xatol": _TOLERANCE,
+                "fatol": _TOLERANCE * _TOLERANCE * abs(float(evolved.fun)),
+            },
+        )
+        best = np.minimum.accumulate([np.min(batch) for batch in batches]).tolist()
+        start = SearchStart(
+            fractions=tuple(map(float, refined.x)),
+            cost=float(refined.fun),
+            candidates=sum(map(len, batches)),
+            # The simplex adds one cost, where it ended.
+            generations=(*best[:generations], best[-1]),
+            is_settled=_is_settled(evolved.population_energies),
+        )
+        starts.append(start)
+    return sorted(starts, key=lambda start: start.cost)
 
 
 def _is_settled(costs: Floats) -> bool:
@@ -833,6 +818,26 @@ def _finding(tuned: Tuned) -> Finding[Tuned]:
         numbers = (gain.before, after.gains[gain.path], gain.minimum, gain.maximum)
         end = f"at its {tuned.bounds_reached[gain.path]}" if gain.path in tuned.bounds_reached else ""
         rows.append((gain.path, *map(gain.place.quote, numbers), end))
+    kinds, sides = {name: of_metric(name) for name in problem.is_worse_high}, {"before": tuned.before.values}
+    if problem.uncertainty is not None:
+        sides = {f"before ({problem.measure})": tuned.before.values}
+    sides["after"] = after.values
+    if problem.uncertainty is not None:
+        sides |= {"before, fresh draws": tuned.before.fresh, "after, fresh draws": after.fresh}
+        for title, side in (("before, nominal", tuned.before), ("after, nominal", after)):
+            sides[title] = {name: metric.value for name, metric in side.metrics.items()}
+    columns = {
+        "metric": [f"{name} ({kind.shown_unit})" if kind.quantity else name for name, kind in kinds.items()],
+        **{
+            title: [
+                kind.number(own[name]) if math.isfinite(own.get(name, math.nan)) else "" for name, kind in kinds.items()
+            ]
+            for title, own in sides.items()
+        },
+        "constraint": [
+            ", ".join(limit.words for limit in problem.constraints if limit.metric == name) for name in kinds
+        ],
+    }
     # The scenario's file, or the name of one that comes with the package, finds it again.
     name, command = scenario.origin.file or scenario.name, scenario.motion.motion_kind.command
     # Texts of TOML and of Python alike.
@@ -851,7 +856,7 @@ def _finding(tuned: Tuned) -> Finding[Tuned]:
             Section("Gains", columns_of(("gain", "before", "after", "minimum", "maximum", ""), rows)),
             Section(
                 "Before and after",
-                _metric_columns(tuned),
+                [Column(title, cells) for title, cells in columns.items()],
                 panels=partial(_task_panels, tuned),
                 name="task",
                 caption="The nominal device.",
@@ -872,28 +877,6 @@ def _finding(tuned: Tuned) -> Finding[Tuned]:
         files={"overrides.txt": pasted.encode},
         overrides=problem.changes,
     )
-
-
-def _metric_columns(tuned: Tuned) -> list[Column]:
-    """Return the columns of a table with a row for each metric of the goals and constraints."""
-    problem, before, after = tuned.problem, tuned.before, tuned.after
-    kinds = {name: of_metric(name) for name in problem.is_worse_high}
-    sides = {"before": before.values, "after": after.values}
-    if problem.uncertainty is not None:
-        sides = {f"before ({problem.measure})": before.values, "after": after.values}
-        sides |= {"before, fresh draws": before.fresh, "after, fresh draws": after.fresh}
-        for title, side in (("before, nominal", before), ("after, nominal", after)):
-            sides[title] = {name: metric.value for name, metric in side.metrics.items()}
-    titles = [f"{name} ({kind.shown_unit})" if kind.quantity else name for name, kind in kinds.items()]
-    limits = [", ".join(limit.words for limit in problem.constraints if limit.metric == name) for name in kinds]
-    numbers = [
-        Column(
-            title,
-            [kind.number(own[name]) if math.isfinite(own.get(name, math.nan)) else "" for name, kind in kinds.items()],
-        )
-        for title, own in sides.items()
-    ]
-    return [Column("metric", titles), *numbers, Column("constraint", limits)]
 
 
 def _task_panels(tuned: Tuned) -> list[Panel]:

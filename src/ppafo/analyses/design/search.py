@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import cycle, product
+from operator import methodcaller
 from typing import TYPE_CHECKING, Any, Literal, final
 
 import numpy as np
@@ -266,26 +267,21 @@ class Trials:
         The gains of the scenario fit its own device. For other valves and pressures they are scaled, so that the ratio
         to the gains of the rules in ``control.torque_loop`` stays the same.
         """
-        problem, count = self.problem, pressure.size
+        problem, count, scenario = self.problem, pressure.size, self.problem.scenario
         columns = {path: np.full(count, number) for path, number in valve.numbers.items()}
         columns |= {path: columns[path] * opening for path in _OPENINGS if path in columns}
         columns |= {"supply.pressure": pressure, "supply.dorsiflexion_pressure": pressure}
-        settings = problem.scenario.controller.settings
-        gain_ratio = self.rule_gain(columns) / self.rule_gain({}) if problem.gains else 1.0
+        links = gain_links(LoopParts(scenario.device, LawSignals()), CONTROLLERS[scenario.controller.kind])
+
+        def rule_gain(changed: Mapping[str, Floats]) -> Any:
+            number = links[PROPORTIONAL_GAIN].number
+            return number(lambda path: changed[path] if path in changed else number_at(scenario, path))
+
+        gain_ratio = rule_gain(columns) / rule_gain({}) if problem.gains else 1.0
         for index, path in enumerate(problem.gains):
-            columns[path] = self.gain_sets[gains, index] * settings[path.rpartition(".")[2]] * gain_ratio
+            setting = scenario.controller.settings[path.rpartition(".")[2]]
+            columns[path] = self.gain_sets[gains, index] * setting * gain_ratio
         return columns
-
-    def rule_gain(self, columns: Mapping[str, Floats]) -> Any:
-        """Return the proportional gain [1/(N m)] of the tuning rules.
-
-        ``columns`` replace numbers of the device by path.
-        """
-        scenario = self.problem.scenario
-        link = gain_links(LoopParts(scenario.device, LawSignals()), CONTROLLERS[scenario.controller.kind])[
-            PROPORTIONAL_GAIN
-        ]
-        return link.number(lambda path: columns[path] if path in columns else number_at(scenario, path))
 
 
 def size_for_profile(problem: SizingProblem, threads: int | None, report: Report) -> Sizing:
@@ -659,11 +655,15 @@ def _pressure_panels(sizing: Sizing) -> list[Panel]:
         if not any(sized.works for sized in sizing.valves):
             axes.text(0.5, 0.5, "no valve keeps the limit", transform=axes.transAxes, ha="center", color=GREY)
 
-    def set_error(axes: "Axes") -> None:
-        axes.set_ylim(0.0, highest)
-
     return [
-        Panel(PRESSURE, error_kind, errors + rings, "RMS error, limit dashed", legend="figure", then=set_error),
+        Panel(
+            PRESSURE,
+            error_kind,
+            errors + rings,
+            "RMS error, limit dashed",
+            legend="figure",
+            then=methodcaller("set_ylim", 0.0, highest),
+        ),
         Panel(PRESSURE, gas_kind, gases, "Gas, within the limit", then=set_gas),
     ]
 

@@ -624,6 +624,11 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     in_words = limits_of(scenario, plant, point)
     if not np.any(b[:, 0]) and not np.any(d[:, 0]):
         in_words["valve"] += f"; {DEAF}"
+    sent_per_opening = 1.0
+    if run.program.inverts_valve:
+        opening, sent = (in_program(port, run.program, run.effects) for port in (at_valve, sent_command))
+        wanted = opening({}, values["command"])
+        sent_per_opening = float(one_sided_slopes(lambda at: np.array([sent({}, at)]), wanted, 1.0, 1.0)[0][0])
     kinks = [name for name, differs in zip(columns, is_kink.tolist(), strict=True) if differs]
     model = LinearModel(
         scenario=scenario,
@@ -639,7 +644,7 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
         sides=in_words,
         edges={name: "above" if sides[name] > 0.0 else "below" for name in kinks},
         delays=OmittedDelays(run.command_delay, run.signal_delay, run.period),
-        sent_per_opening=sent_per_opening(run, values["command"]),
+        sent_per_opening=sent_per_opening,
     )
     return replace(model, margins=loop_margins(model))
 
@@ -675,15 +680,6 @@ def limits_of(scenario: Scenario, linearised: LinearisedPlant, point: Point) -> 
         is_vacuum = min(at["supply_pressure"], at["dorsiflexion_pressure"]) < atmosphere
         valve = f"{'evacuates' if is_vacuum else 'feeds'} chamber {chamber}, open by {max(openings):.4g}"
     return {"valve": valve, joint.name: vane, **regimes}
-
-
-def sent_per_opening(run: Run, command: float) -> float:
-    """Return the change of the command that a law sends over that of the opening that it wants [-]."""
-    if not run.program.inverts_valve:
-        return 1.0
-    opening, sent = (in_program(port, run.program, run.effects) for port in (at_valve, sent_command))
-    slopes, _ = one_sided_slopes(lambda wanted: np.array([sent({}, wanted)]), opening({}, command), 1.0, 1.0)
-    return float(slopes[0])
 
 
 # Control loop with the scenario's own PID.

@@ -4,7 +4,7 @@ The task starts with an error of exactly 0, so the first decision is undefined a
 unknown. The pair is therefore simulated for each phase, with either valve first.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -46,11 +46,10 @@ def phased_runs(solenoid: Result) -> tuple[Floats, Floats]:
     Both have shape (runs,), with valve A first and then with valve B first. Run number ``PHASES``, a whole period with
     A first, is the scenario as written. If the task has no undefined phase, there is only the given run.
     """
-    scenario = solenoid.scenario
+    scenario, reference, period = solenoid.scenario, solenoid.scenario.reference, solenoid.scenario.controller.period
     # Two runs are joined by their pressures, which are the whole state only of a locked vane at constant temperature
     # without lines; and a tie is only where reference and torque both begin at 0.
-    reference, period = scenario.reference, scenario.controller.period
-    if (
+    has_tie = (
         scenario.controller.kind == "on_off"
         and isinstance(scenario.motion, PrescribedMotion)
         and scenario.motion.kind == "locked"
@@ -61,45 +60,33 @@ def phased_runs(solenoid: Result) -> tuple[Floats, Floats]:
         and reference.start_level == 0.0
         and reference.ramp_time > period
         and scenario.run.duration > period
-    ):
-        fine = replace(scenario, run=replace(scenario.run, step=_STEP, output_interval=_STEP))
-        runs = [run for tie in (_TIE, -_TIE) for run in _runs_with_first_valve(fine, tie)]
-    else:
+    )
+    if not has_tie:
         gas = GRAMS_PER_KILOGRAM * solenoid.metrics["gas_supplied"].value
-        runs = [(solenoid.metrics["rms_error"].value, gas)]
+        return np.array([solenoid.metrics["rms_error"].value]), np.array([gas])
+    fine, duration = replace(scenario.run, step=_STEP, output_interval=_STEP), scenario.run.duration
+    slope, runs = reference.settings["level"] / reference.settings["ramp_time"], list[tuple[float, float]]()
+    for tie in (_TIE, -_TIE):
+        # Until the first decision, a constant reference just off 0 calls one valve at once and holds it on.
+        constant = with_reference(scenario, start_level=tie, level=tie)
+        start = simulate(replace(constant, run=replace(fine, duration=period))).recording
+        for number in range(1, PHASES + 1):
+            phase = period * number / PHASES
+            last = round(phase / _STEP)
+            # After it the task continues from the pressures at this time.
+            onward = with_reference(
+                scenario, start_level=slope * phase, ramp_time=reference.settings["ramp_time"] - phase
+            )
+            initial = Initial(float(start["pressure_1"][last]), float(start["pressure_2"][last]))
+            run = replace(fine, duration=duration - phase)
+            continued = simulate(replace(onward, run=run, initial=initial)).metrics
+            error_before = slope * start.time[: last + 1] - start["torque"][: last + 1]
+            # Mean squares of both parts, each with its time.
+            square = phase * float(np.mean(error_before**2)) + (duration - phase) * continued["rms_error"].value ** 2
+            gas = float(start["supplied_mass"][last]) + continued["gas_supplied"].value
+            runs.append((float(np.sqrt(square / duration)), GRAMS_PER_KILOGRAM * gas))
     errors, gas_masses = np.array(runs).T
     return errors, gas_masses
-
-
-def _runs_with_first_valve(scenario: Scenario, tie: float) -> Iterator[tuple[float, float]]:
-    """Yield RMS torque error [N m] and gas [g] of the run for each phase of the decisions.
-
-    Until the first decision, a constant reference ``tie`` [N m] keeps one valve on. After it the task continues from
-    the pressures at this time.
-    """
-    period, duration = scenario.controller.period, scenario.run.duration
-    ramp = scenario.reference.settings
-    slope = ramp["level"] / ramp["ramp_time"]
-    # A constant reference just off 0 calls one valve at once and holds it on.
-    constant = with_reference(scenario, start_level=tie, level=tie)
-    start = simulate(replace(constant, run=replace(scenario.run, duration=period))).recording
-    for number in range(1, PHASES + 1):
-        phase = period * number / PHASES
-        last = round(phase / _STEP)
-        onward = with_reference(scenario, start_level=slope * phase, ramp_time=ramp["ramp_time"] - phase)
-        continued = simulate(
-            replace(
-                onward,
-                run=replace(scenario.run, duration=duration - phase),
-                initial=Initial(float(start["pressure_1"][last]), float(start["pressure_2"][last])),
-            )
-        )
-        error_before = slope * start.time[: last + 1] - start["torque"][: last + 1]
-        # Mean squares of both parts, each with its time.
-        error_after = continued.metrics["rms_error"].value
-        square = phase * float(np.mean(error_before**2)) + (duration - phase) * error_after**2
-        gas = float(start["supplied_mass"][last]) + continued.metrics["gas_supplied"].value
-        yield float(np.sqrt(square / duration)), GRAMS_PER_KILOGRAM * gas
 
 
 def with_reference(scenario: Scenario, **settings: float) -> Scenario:

@@ -27,14 +27,14 @@ _SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow", "eff
 _COLUMNS = ("path", "value", "unit", "origin", "source")
 
 
-def values_document(parameter_set: ParameterSet) -> dict[str, Any]:
-    """Return every value of a set with its source, as plain data."""
-    citation, parameter_set = parameter_set.citation, with_followers(parameter_set)
+def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
+    """Return every value of a set with its source as a finding with one table."""
+    stated, parameter_set = parameter_set.citation, with_followers(parameter_set)
     # By section only, so that within a section texts come first and numbers as they are declared.
     entries = sorted(parameter_set.entries().items(), key=lambda entry: _SECTIONS.index(entry[0].partition(".")[0]))
-    return {
+    document: dict[str, Any] = {
         **fields_of(parameter_set, "name", "title", "completed_by", "parent", "default_valve"),
-        "citation": None if citation is None else asdict(citation),
+        "citation": None if stated is None else asdict(stated),
         "notes": parameter_set.notes.strip(),
         "valves": dict(parameter_set.valve_kinds),
         "actuator": parameter_set.actuator_kind,
@@ -42,11 +42,6 @@ def values_document(parameter_set: ParameterSet) -> dict[str, Any]:
         "values": [{"path": path, **asdict(entry)} for path, entry in entries],
         "accepted": dict(parameter_set.accepted),
     }
-
-
-def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
-    """Return every value of a set with its source as a finding with one table."""
-    document = values_document(parameter_set)
     notes, citation = document["notes"], document["citation"]
     cited = ""
     if citation is not None:
