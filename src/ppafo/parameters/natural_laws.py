@@ -46,14 +46,14 @@ _SPEEDS = (-30.0, -1.0, -0.01, 0.01, 1.0, 30.0)
 """Angular velocities at which friction is tried [rad/s]."""
 
 
-class Departure(NamedTuple):
+class LawDeparture(NamedTuple):
     """Departure from a law of nature: relative size [-], and a sentence with the numbers and the place."""
 
     size: float
     text: str
 
 
-def actuator_departure(model: ActuatorModel, plant: Any) -> Departure:
+def actuator_departure(model: ActuatorModel, plant: Any) -> LawDeparture:
     """Return the largest departure of an actuator from virtual work and from the gas that fills its chambers.
 
     Virtual work: the torque grows with a gauge pressure as the volume of this chamber with the angle, so that the
@@ -92,20 +92,20 @@ def actuator_departure(model: ActuatorModel, plant: Any) -> Departure:
         text = f"{place} the gas of these pressures gives {_kilopascals(filled[0])} and {_kilopascals(filled[1])}"
         found.append((max(abs(own / each - 1.0) for own, each in zip(filled, pressures, strict=True)), math.inf, text))
     growth = max(scale for _, scale, _ in found if scale < math.inf) or 1.0
-    return max(Departure(size if scale == math.inf else size / growth, text) for size, scale, text in found)
+    return max(LawDeparture(size if scale == math.inf else size / growth, text) for size, scale, text in found)
 
 
-def valve_departure(model: ValveModel, settings: Any, plant: Any) -> Departure:
+def valve_departure(model: ValveModel, settings: Any, plant: Any) -> LawDeparture:
     """Return the largest departure of the steady flow of ``advance`` from the one of ``instant``.
 
     Time stepping uses the first, the reference solver the second. A valve that does not come to rest departs by 0, and
     so does one that regulates pressures.
     """
     if model.instant is None:
-        return Departure(0.0, "")
+        return LawDeparture(0.0, "")
     valve, room = model.prepare(settings), plant.atmospheric_pressure
     pressure = room + 0.5 * (plant.supply_pressure - room)
-    full, found = plant.valve_conductance * max(plant.supply_pressure, room), [Departure(0.0, "")]
+    full, found = plant.valve_conductance * max(plant.supply_pressure, room), [LawDeparture(0.0, "")]
     for command in _COMMANDS:
         state, time, parts, flows = model.initial(), 0.0, 0, list[list[float]]()
         for step in _STEPS:
@@ -126,17 +126,17 @@ def valve_departure(model: ValveModel, settings: Any, plant: Any) -> Departure:
                     f"at the command {command:g} advance comes to rest with {1e3 * last:.4g} g/s into chamber {number} "
                     f"at {_kilopascals(pressure)}, but instant gives {1e3 * other:.4g} g/s"
                 )
-                found.append(Departure(abs(last - other) / full, text))
+                found.append(LawDeparture(abs(last - other) / full, text))
     return max(found)
 
 
-def effect_departure(effect: Effect, row: Any, plant: Any) -> Departure:
+def effect_departure(effect: Effect, row: Any, plant: Any) -> LawDeparture:
     """Return the largest departure of an effect with parameters ``row`` from the sign of what it acts on.
 
     Friction, drag, an impact and the flow through a path take power and never give it.
     """
     room, supply, middle = plant.atmospheric_pressure, plant.supply_pressure, 0.5 * (plant.angle_min + plant.angle_max)
-    rows, found = {effect.name: row}, [Departure(0.0, "")]
+    rows, found = {effect.name: row}, [LawDeparture(0.0, "")]
     if effect.state is not None:
         start, now = effect.state.start, PlantSnapshot(middle, 0.0, room, room, 0.0, 0.0, 0.0)
         rows[effect.state_name] = effect.state.row() if start is None else start(row, now)
@@ -168,7 +168,7 @@ def effect_departure(effect: Effect, row: Any, plant: Any) -> Departure:
                 f"{port.__name__}({numbers}) is {value:.4g}, on the wrong side of {zero:.4g}: what acts there takes "
                 "power and never gives it"
             )
-            found.append(Departure(max(0.0, sign * (zero - value)) / scale, text))
+            found.append(LawDeparture(max(0.0, sign * (zero - value)) / scale, text))
     return max(found)
 
 
@@ -178,7 +178,7 @@ def broken_laws(device: Device) -> Iterator[str]:
     effects = [effect for effect in effects_of(device) if not EFFECTS.is_own(effect.name)]
     if ACTUATORS.is_own(actuator) and VALVES.is_own(valve) and not effects:
         return
-    plant, departures = plant_parameters(device), list[tuple[str, Departure]]()
+    plant, departures = plant_parameters(device), list[tuple[str, LawDeparture]]()
     if not ACTUATORS.is_own(actuator):
         departures.append((f"actuator '{actuator}'", actuator_departure(ACTUATORS[actuator].model, plant)))
     if not VALVES.is_own(valve):

@@ -1,35 +1,11 @@
 """A loop that does not move at all says so, and with what it would."""
 
-import re
-
 import numpy as np
 import pytest
 
 from ppafo.loading import load_scenario
-from ppafo.remedy_trials import tried
 from ppafo.running import simulate
-from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.remedies import level_text
-
-SERVO = ("cylinder-servo", ("run.duration=1 s",))
-STUCK = ("friction.static_torque=2 N m", "friction.dynamic_torque=1 N m")
-LEARNS_NOTHING = ("controller.static_torque=0 N m", "controller.load_time=0 s", "controller.friction_torque=0 N m")
-
-
-def servo(*overrides: str) -> Scenario:
-    return load_scenario(SERVO[0], (*SERVO[1], *overrides))
-
-
-def test_a_joint_that_friction_holds_is_named_with_a_stiffness_that_moves_it() -> None:
-    weak = ("controller.angle_stiffness=4 N m/rad", *LEARNS_NOTHING)
-    verdict = simulate(servo(*STUCK, *weak)).tracking
-    assert verdict.fails
-    assert verdict.moved == 0.0
-    assert verdict.sentence.startswith("the angle loop does not move: 0 of the requested 10 deg; static friction holds")
-    assert "with 2 N m, but the controller requests only" in verdict.sentence
-    mended = tried(servo(*STUCK, *weak), verdict)
-    assert mended is not None
-    assert re.match(r"controller.angle_stiffness=\S+ N m/rad", mended.mended[0])
 
 
 @pytest.mark.parametrize(

@@ -402,6 +402,9 @@ def test_a_run_without_a_verdict_says_why_and_its_remedy_gives_one(changes: list
 
 TOLERANT = ["reference.kind=ramp_hold", "reference.start_level=90 deg", "reference.level=92 deg"]
 TOLERANT += ["reference.ramp_time=0.1 s", "friction.static_torque=2 N m", "controller.tolerance=1 deg"]
+HELD = ["friction.static_torque=2 N m", "friction.dynamic_torque=1 N m", "run.duration=1 s"]
+HELD += [f"controller.{name}" for name in ("angle_stiffness=4 N m/rad", "static_torque=0 N m", "load_time=0 s")]
+HELD += ["controller.friction_torque=0 N m"]
 PARTLY = ["controller.kind=on_off_dead_zone", "controller.opening=0.77", "reference.level=2.4 N m"]
 PARTLY += ["valve.area=0.126 mm^2"]
 LEVEL, SLOW = "reference.level=3 N m", "torque-task-slow-valve"
@@ -428,6 +431,7 @@ TRIANGLE += ["reference.value_01=0 N m", "reference.value_04=0 N m"]
         ("torque-task-solenoid", PARTLY, "it is too small for this task", "valve.area="),
         ("cylinder-servo", ["valve.spool_frequency=3 Hz"], "frequency = 3 Hz` gives most of", "frequency=300 Hz"),
         ("cylinder-servo", ["controller.rate=20 Hz"], "rate = 20 Hz` gives most of the loop's", "rate=1000 Hz"),
+        ("cylinder-servo", HELD, "static friction holds the joint with 2 N m, but", "controller.angle_stiffness="),
         ("cylinder-servo", TOLERANT, "controller.tolerance = 1 deg`", "controller.tolerance="),
         ("solenoid", ["run.duration=6 s", "valve.area=0.0126 mm^2"], "too small for the speed", "valve.area=12.6 mm^2"),
         (TASK, [LEVEL, "controller.proportional_gain=95 1/(N m)"], "gains do not suit this", "proportional_gain"),
