@@ -242,15 +242,13 @@ def noise_in(values: Floats, full_range: float) -> float:
 
 def replay_of(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> Replay:
     """Return the replay of a recording on a device, or on a fixed volume if the settings have one."""
-    motion, initial = settings.motion, settings.initial
     if settings.volume is not None:
         device, beside = with_fixed_volume(device, settings.volume)
-        motion, initial = "locked", {**initial, **beside}
-    if motion == "measured" and ANGLE not in measured.recording:
+        settings = replace(settings, motion="locked", initial={**settings.initial, **beside})
+    if settings.motion == "measured" and ANGLE not in measured.recording:
         prescribed = argument_text("motion", "measured")
         raise DataError(f"{measured.file}: {prescribed} needs a channel '{ANGLE}', which the recording does not have")
-    start = start_of(measured.recording, device, initial, measured.file)
-    return Replay(measured, device, start, motion, settings.longest_delay, settings.leg)
+    return Replay(measured, device, start_of(measured.recording, device, settings.initial, measured.file), settings)
 
 
 def compare_recording(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> RecordingAgreement:
@@ -259,24 +257,21 @@ def compare_recording(measured: MeasuredRecording, device: Device, settings: Rep
     replayed = replay_together([request])[0]
     if isinstance(replayed, PpafoError):
         raise replayed
-    return agreement_of(request, replayed, settings)
+    return agreement_of(request, replayed)
 
 
-def agreement_of(
-    request: Replay, replayed: Replayed, settings: ReplaySettings, known_delay: float | None = None
-) -> RecordingAgreement:
+def agreement_of(request: Replay, replayed: Replayed, known_delay: float | None = None) -> RecordingAgreement:
     """Return the comparison of a recording with its replay; a ``known_delay`` [s] takes the place of the estimate."""
-    measured = request.measured
-    curves = _curves(measured, replayed, request.device, settings)
+    measured, longest_delay = request.measured, request.settings.longest_delay
+    curves = _curves(request, replayed)
     # Sums and multiples of two others do not count twice.
     sensed = [curve for curve in curves if curve.channel in (ANGLE, PRESSURE_1, PRESSURE_2)]
     delay = Delay(known_delay or 0.0, is_at_limit=False)
     if known_delay is None:
-        delay = estimate_delay(sensed or curves[:1], settings.longest_delay)
-    remarks = [*measured.remarks, *_remarks(measured, request.device, settings)]
+        delay = estimate_delay(sensed or curves[:1], longest_delay)
+    remarks = [*measured.remarks, *_remarks(measured, request.device, request.settings)]
     if delay.is_at_limit:
-        limit = settings.longest_delay
-        remarks.append(f"model and measurement differ in time by more than {limit:g} s; no delay was removed")
+        remarks.append(f"model and measurement differ in time by more than {longest_delay:g} s; no delay was removed")
     elif delay.value < 0.0:
         remarks.append(
             f"the recorded signals lead the model by {1.0e3 * -delay.value:.3g} ms; sensors lag, so this was not "
@@ -287,7 +282,7 @@ def agreement_of(
         sha256=measured.sha256,
         measured=measured.recording,
         model=replayed.recording,
-        motion=request.motion,
+        motion=request.settings.motion,
         inputs=replayed.inputs,
         step=replayed.step,
         delay=delay,
@@ -296,16 +291,15 @@ def agreement_of(
     )
 
 
-def _curves(
-    measured: MeasuredRecording, replayed: Replayed, device: Device, settings: ReplaySettings
-) -> list[ChannelAgreement]:
+def _curves(request: Replay, replayed: Replayed) -> list[ChannelAgreement]:
     """Return measured and modelled curves of the recorded channels, without inputs. Raises DataError if none remain."""
-    gauge = supply_gauge(measured.recording, device)
+    recorded, device, settings = request.measured.recording, request.device, request.settings
+    gauge = supply_gauge(recorded, device)
     # Where the vane is locked, or where there is none, some channels carry no information.
     informative = {name for name in COMPARED if settings.motion != "locked" or name != ANGLE}
     if settings.volume is not None:
         informative = {PRESSURE_1}
-    curves, recorded, model = [], measured.recording, replayed.recording
+    curves, model = [], replayed.recording
     for name, channel in COMPARED.items():
         is_of_both = name == PRESSURE_DIFFERENCE and PRESSURE_1 in recorded and PRESSURE_2 in recorded
         if name in informative and name not in replayed.inputs and (is_of_both or name in recorded):
@@ -325,7 +319,7 @@ def _curves(
             )
     if not curves:
         needed = "pressure_1" if settings.volume is not None else "a channel other than the prescribed angle"
-        raise DataError(f"{measured.file}: no channel can be compared; the recording needs {needed}")
+        raise DataError(f"{request.measured.file}: no channel can be compared; the recording needs {needed}")
     return curves
 
 

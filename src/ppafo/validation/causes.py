@@ -533,10 +533,11 @@ class CauseSearch:
                 recording = request.measured.recording
                 for name, sensor in change.sensors.items():
                     if sensor.delay and name in recording:
-                        in_step = np.interp(recording.time + sensor.delay, recording.time, recording[name])
-                        recording = recording.with_channel(name, in_step, recording.unit(name))
-                corrected = replace(request, measured=replace(request.measured, recording=recording))
-                agreement = agreement_of(corrected, replayed, self.settings, abs(change.delay) or None)
+                        values = np.interp(recording.time + sensor.delay, recording.time, recording[name])
+                        recording = recording.with_channel(name, values, recording.unit(name))
+                in_step = replace(request.measured, recording=recording)
+                corrected = replace(request, measured=in_step, settings=self.settings)
+                agreement = agreement_of(corrected, replayed, abs(change.delay) or None)
                 errors += [channel.in_noise for channel in agreement.channels]
             # Wrong samples are left out of the errors of the search alone.
             left.append(max(errors) if change.start is None else cause.left)

@@ -19,9 +19,9 @@ from ppafo.simulation.recorded.channels import COMMAND, DORSIFLEXION_SUPPLY, EXT
 from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs, with_highest_supply, with_prescribed_angle
 from ppafo.simulation.recorded.replay import locked_vane, replay_scenario
 from ppafo.simulation.recorded.rest import ReplayStart
-from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario, vane_motion
+from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario, vane_motion
 from ppafo.validation.measured import MeasuredRecording
-from ppafo.validation.settings import ANGLE, Motion
+from ppafo.validation.settings import ANGLE, Motion, ReplaySettings
 
 MAXIMUM_STEPS = 20_000_000
 """Largest number of steps of a replay; more indicates a wrong time unit."""
@@ -42,17 +42,12 @@ class Replayed:
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """Request to replay a recording on a device, continued for ``extra`` [s] with the last inputs.
-
-    The motion ``leg`` uses ``leg``, or the fixture of figure 7 if ``leg`` is None.
-    """
+    """Request to replay a recording on a device, continued for the longest delay with the last inputs."""
 
     measured: MeasuredRecording
     device: Device
     start: ReplayStart
-    motion: Motion
-    extra: float
-    leg: Leg | None = None
+    settings: ReplaySettings
 
 
 def replay_together(requests: Sequence[Replay]) -> list[Replayed | PpafoError]:
@@ -66,7 +61,7 @@ def replay_together(requests: Sequence[Replay]) -> list[Replayed | PpafoError]:
     for number, request in enumerate(requests):
         try:
             recording = request.measured.recording
-            followed = followed_channels(request.measured, request.motion)
+            followed = followed_channels(request.measured, request.settings.motion)
             run = _plan(request)
             inputs = step_inputs(RecordedInputs(recording, followed, float(recording.time[0])), request.device, run)
             batch = batch_of(run)
@@ -125,7 +120,7 @@ def _replayed(planned: _Planned, rows: Mapping[str, int], record: Floats, ends: 
     times = recorded.time[0] + interval * np.arange(record.shape[0], dtype=np.float64)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
     model = Recording(f"{recorded.label}, replayed", times, values, kind="simulated")
-    return Replayed(model, run.step, followed_channels(request.measured, request.motion))
+    return Replayed(model, run.step, followed_channels(request.measured, request.settings.motion))
 
 
 def followed_channels(measured: MeasuredRecording, motion: Motion) -> tuple[str, ...]:
@@ -140,16 +135,16 @@ def replayed_scenario(request: Replay) -> Scenario:
 
     A measured angle is prescribed later, when the run is planned.
     """
-    recording, start = request.measured.recording, request.start
+    recording, start, settings = request.measured.recording, request.start, request.settings
     motion: FreeMotion | PrescribedMotion | None = None
-    if request.motion == "locked":
+    if settings.motion == "locked":
         motion = locked_vane(start.angle)
-    elif request.motion == "leg":
+    elif settings.motion == "leg":
         # The leg on the test fixture is the scenario's of figure 7.
-        leg = request.leg or vane_motion(load_scenario("step-response")).leg
+        leg = settings.leg or vane_motion(load_scenario("step-response")).leg
         motion = FreeMotion(start.angle, start.angular_velocity, leg=leg)
     highest = with_highest_supply(request.device, recording, recording.names)
-    duration = recording.duration + max(request.extra, sample_period(recording.time))
+    duration = recording.duration + max(settings.longest_delay, sample_period(recording.time))
     return replay_scenario(recording, highest, start, duration, request.measured.file, motion)
 
 
@@ -169,4 +164,4 @@ def _plan(request: Replay) -> Run:
     most = max(1, int(_RECORD_INTERVAL / run.step * (1.0 + _ROUNDING)))
     every = max(count for count in range(1, most + 1) if run.steps_per_sample % count == 0)
     run = replace(run, plant=plant, record_every=every, step_count=samples * run.steps_per_sample)
-    return with_prescribed_angle(run, request.start.angle) if request.motion == "measured" else run
+    return with_prescribed_angle(run, request.start.angle) if request.settings.motion == "measured" else run
