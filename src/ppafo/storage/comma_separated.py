@@ -49,6 +49,20 @@ class HeaderColumn:
             return TIME_UNIT
         return CHANNELS[self.name].unit if self.name in CHANNELS else self.unit
 
+    def channel(self, values: Floats, atmosphere: float) -> Channel:
+        """Return the channel of values in the unit of the column; gauge pressure is relative to ``atmosphere`` [Pa].
+
+        Raises UnitError for a unit that does not fit.
+        """
+        from ppafo.units import check_unit, to_si
+
+        known, wanted = (_SPELT.get(unit, unit) for unit in (self.unit, self.si_unit))
+        if self.unit != self.si_unit:
+            values = np.array([to_si(value, known, wanted, atmosphere) for value in values.tolist()])
+        elif self.name not in CHANNELS:
+            check_unit(known)
+        return Channel(values, self.si_unit, self.between, self.unit)
+
 
 def parse_header(cells: list[str]) -> list[HeaderColumn]:
     """Parse a header such as ``time [s]``, ``pressure_1 [psi_g]`` into columns, time first.
@@ -106,21 +120,6 @@ def check_clock(time: Floats, lines: Sequence[int], noun: str = "line") -> None:
             f"{noun} {lines[index]}, column '{TIME}': the clock {word}: {time[index]:.9g} s follows "
             f"{time[index - 1]:.9g} s; time must increase from sample to sample"
         )
-
-
-def in_si(column: HeaderColumn, values: Floats, atmosphere: float) -> Floats:
-    """Convert values to the unit of the recording; gauge pressure is relative to ``atmosphere`` [Pa absolute].
-
-    Raises UnitError for a unit that does not fit.
-    """
-    from ppafo.units import check_unit, to_si
-
-    if column.unit != column.si_unit:
-        known, wanted = (_SPELT.get(unit, unit) for unit in (column.unit, column.si_unit))
-        return np.array([to_si(value, known, wanted, atmosphere) for value in values.tolist()])
-    if column.name not in CHANNELS:
-        check_unit(_SPELT.get(column.unit, column.unit))
-    return values
 
 
 _SPELT = {"Pa": _LEVEL, PLAIN_NUMBER: ""}
@@ -249,19 +248,15 @@ def recording_of_columns(
 
     if not len(values[0]):
         raise DataError("has a header but no samples")
-    series, faults = list[Floats](), list[PpafoError]()
+    channels, faults = dict[str, Channel](), list[PpafoError]()
     for column, numbers in zip(columns, values, strict=True):
         with noted_in(faults), refused_as(DataError, f"column '{column.name} [{column.unit}]'", UnitError):
             if column.si_unit == PLAIN_NUMBER and column.unit.removeprefix("m") in ("V", "A"):
                 raise UnitError(f"'{column.name}' is dimensionless; give factor in a column map")
-            series.append(in_si(column, numbers, atmosphere))
+            channels[column.name] = column.channel(numbers, atmosphere)
     raise_noted(faults)
-    time = counted_on(series[0])
+    time = counted_on(channels.pop(TIME).values)
     check_clock(time, rows, noun)
-    channels = {
-        column.name: Channel(one, column.si_unit, column.between, column.unit)
-        for column, one in zip(columns[1:], series[1:], strict=True)
-    }
     return Recording(label, time, channels, kind)
 
 

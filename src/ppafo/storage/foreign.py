@@ -33,7 +33,6 @@ from ppafo.storage.comma_separated import (
     HeaderColumn,
     check_clock,
     header_cells,
-    in_si,
     kind_of_comments,
 )
 from ppafo.storage.files import read_bytes, text_of
@@ -360,9 +359,8 @@ def _channel(name: str, mapped: MappedChannel, table: MappedTable, atmosphere: f
     if mapped.constant is not None:
         with refused_as(DataError, f"channels.{name}.constant = {mapped.constant!r}", UnitError):
             value, unit = split_number(mapped.constant)
-            column = HeaderColumn(name, _flow_unit(name, unit, mapped, gas) or PLAIN_NUMBER)
-            values = in_si(column, np.full(table.size, value), atmosphere)
-            return Channel(values, column.si_unit, mapped.between, column.unit)
+            column = HeaderColumn(name, _flow_unit(name, unit, mapped, gas) or PLAIN_NUMBER, mapped.between)
+            return column.channel(np.full(table.size, value), atmosphere)
     numbers = table.numbers.get(name, np.empty(0))
     values, unit = mapped.sign * (mapped.factor * numbers + mapped.offset), mapped.unit
     key = f"unit = {mapped.unit!r}"
@@ -372,8 +370,7 @@ def _channel(name: str, mapped: MappedChannel, table: MappedTable, atmosphere: f
         values, unit = values * multiple, f"{unit} {unit_of_multiple}".removeprefix(f"{PLAIN_NUMBER} ").strip()
         key += f" with times = {mapped.times!r}"
     with refused_as(DataError, f"channels.{name}.{key}", UnitError):
-        column = HeaderColumn(name, _flow_unit(name, unit, mapped, gas))
-        return Channel(in_si(column, values, atmosphere), column.si_unit, mapped.between, column.unit)
+        return HeaderColumn(name, _flow_unit(name, unit, mapped, gas), mapped.between).channel(values, atmosphere)
 
 
 def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:

@@ -202,10 +202,9 @@ def test_nonsense_in_subject_and_events_is_as_if_it_were_absent(trial: Trial) ->
     file.add_parameter("PROCESSING", "Bodymass", [-1.0])
     file.add_parameter("EVENT", "TIMES", [1.0, 2.0, 3.0])
     file.write(str(path))
-    found = read_table(path).trial
-    assert found is not None
+    found = read_table(path)
     assert (found.body_mass, found.events) == (None, {})
-    (said,) = (line for line in read_table(path).remarks if "events" in line)
+    (said,) = (line for line in found.remarks if "events" in line)
     assert "labels and 3 times, but needs the same number of each" in said
 
 
@@ -217,17 +216,17 @@ def test_a_flat_list_of_events_is_read_and_remarked(trial: Trial, flat: Any, sai
     import ezc3d
 
     path = trial()
-    true = read_table(path).trial
+    true = read_table(path).events
     file = ezc3d.c3d(str(path))
     times = np.asarray(file["parameters"]["EVENT"]["TIMES"]["value"])
     file.add_parameter("EVENT", "TIMES", flat(times).tolist())
     file.write(str(path))
     table = read_table(path)
     assert true is not None
-    assert table.trial is not None
-    assert set(table.trial.events) == set(true.events) != set()
-    for key, expected in true.events.items():
-        assert table.trial.events[key] == pytest.approx(expected, abs=1e-6)
+    assert table.events is not None
+    assert set(table.events) == set(true) != set()
+    for key, expected in true.items():
+        assert table.events[key] == pytest.approx(expected, abs=1e-6)
     assert any(said in line for line in table.remarks)
 
 

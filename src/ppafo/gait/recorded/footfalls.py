@@ -265,10 +265,10 @@ def find_footfalls(
 
 def _of_walk(walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Side, least: int) -> Footfalls:
     """Return the strides from the force, if these are at least ``least``, or from the source with more strides."""
-    trials, recorded = [table.trial for table in tables if table.trial is not None], list[Stride]()
+    trials, recorded = [table.events for table in tables if table.events is not None], list[Stride]()
     # Events of two trials have two clocks.
     if len(trials) == 1:
-        strikes, offs = (trials[0].events.get((side, kind), []) for kind in (STRIKE, OFF))
+        strikes, offs = (trials[0].get((side, kind), []) for kind in (STRIKE, OFF))
         for start, end in pairwise(strikes):
             between = [time for time in offs if start < time < end]
             # Two toe-offs between two strikes are a missed strike: such a stride is none.

@@ -477,7 +477,7 @@ def _with_subject(
     A missing body mass is added to ``wrong``.
     """
     masses, statures = (
-        [(table.file, value) for table in tables if table.trial and (value := getattr(table.trial, name)) is not None]
+        [(table.file, value) for table in tables if (value := getattr(table, name)) is not None]
         for name in ("body_mass", "stature")
     )
     remarks = []

@@ -1,7 +1,7 @@
 """Motion recording as a table: time, and columns in the units of the file; short gaps can be filled."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -31,20 +31,7 @@ def marker_of(name: str) -> str:
 
 
 Events = dict[tuple[str, str], list[float]]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class TrialData:
-    """Data of a recorded file besides its columns: subject (mass [kg], stature [m]; None if not stated) and events.
-
-    ``events`` holds times [s] by side and kind. ``remarks`` state how the events were read, or the reason that they
-    were not.
-    """
-
-    body_mass: float | None = None
-    stature: float | None = None
-    events: Events = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()
+"""Times [s] of the events in a file, by side and kind."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,9 +39,9 @@ class MotionTable:
     """Motion recording: columns over time [s] as stored in a file; a unit that the file does not state is empty.
 
     ``form`` is the name of the file format, set by the caller of the reader. ``kind`` is ``measured`` or ``synthetic``.
-    ``remarks`` describe repairs, ``trial`` holds data on subject and events. ``problem`` is a fault of the file that
-    leaves its columns readable; the import refuses the file after it has checked them. ``is_mean_stride`` is true for a
-    mean stride that was repeated.
+    ``remarks`` describe repairs. ``problem`` is a fault of the file that leaves its columns readable; the import
+    refuses the file after it has checked them. ``is_mean_stride`` is true for a mean stride that was repeated.
+    ``body_mass`` [kg] and ``stature`` [m] of the subject, and ``events``, are None if the file does not state them.
     """
 
     file: str
@@ -64,9 +51,11 @@ class MotionTable:
     form: str = ""
     kind: str = "measured"
     remarks: tuple[str, ...] = ()
-    trial: TrialData | None = None
     problem: str = ""
     is_mean_stride: bool = False
+    body_mass: float | None = None
+    stature: float | None = None
+    events: Events | None = None
 
 
 _TURNS = 3

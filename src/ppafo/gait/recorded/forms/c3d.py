@@ -12,7 +12,7 @@ from ppafo.gait.gait import BODY_MASSES, STATURES
 from ppafo.gait.recorded.delimited import merged, told_apart
 from ppafo.gait.recorded.form import GaitForm
 from ppafo.gait.recorded.forms.markers import PLATE, marker_convention
-from ppafo.gait.recorded.table import AXES, Events, MotionTable, TrialData, bare_label
+from ppafo.gait.recorded.table import AXES, Events, MotionTable, bare_label
 from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes
 from ppafo.storage.trial_reading import check_can_be_read
@@ -94,16 +94,20 @@ def read_c3d(path: str | Path) -> MotionTable:
     mass, height = _number(subject, _BODY), _number(subject, _HEIGHT)
     # Plug-in Gait keeps the height in mm.
     stature = None if height is None else height / 1000.0 if height > 100.0 else height
-    # An unknown spelling or an implausible value is treated as absent.
-    trial = TrialData(
-        mass if mass is not None and BODY_MASSES[0] <= mass <= BODY_MASSES[1] else None,
-        stature if stature is not None and STATURES[0] <= stature <= STATURES[1] else None,
-        *_events(parameters.get("EVENT", {})),
-    )
-    time = (first + np.arange(frames)) / rate
-    remarks = [*trial.remarks, *doubled]
+    events, on_events = _events(parameters.get("EVENT", {}))
+    remarks = [*on_events, *doubled]
     remarks += [f"{count_of(number - len(labels), 'point')} without a label not read"] if len(labels) < number else []
-    return MotionTable(str(path), time, columns, units, remarks=tuple(remarks), trial=trial)
+    # An unknown spelling or an implausible value is treated as absent.
+    return MotionTable(
+        str(path),
+        (first + np.arange(frames)) / rate,
+        columns,
+        units,
+        remarks=tuple(remarks),
+        body_mass=mass if mass is not None and BODY_MASSES[0] <= mass <= BODY_MASSES[1] else None,
+        stature=stature if stature is not None and STATURES[0] <= stature <= STATURES[1] else None,
+        events=events,
+    )
 
 
 def open_c3d(path: str | Path) -> Any:
