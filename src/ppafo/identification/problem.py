@@ -167,43 +167,43 @@ def load_problem(path: str | Path) -> ProblemFile:
 
     Raises IdentificationError for an invalid file, and for recordings that are not there.
     """
-    content, file, folder = _FILE.read(path), label(str(path)), Path(path).parent
-    problem = parse_problem(content, file)
-    named = {
-        f"procedure.{number}.recordings": item.recordings for number, item in enumerate(problem.procedure, start=1)
-    }
-    fitted = () if problem.trajectory is None else problem.trajectory.experiments
-    named |= {
-        f"trajectory.experiments.{number}.recording": (item.recording,) for number, item in enumerate(fitted, start=1)
-    }
-    gone = {
-        key: f"{key} = {quote(name)}: {'is a folder' if (folder / name).is_dir() else 'there is no such file'}"
-        f"{nearest_name(name, [item.name for item in folder.iterdir()])}"
-        for key, names in named.items()
-        for name in names
-        if not (folder / name).is_file()
-    }
-    if gone:
-        refuse(gone, file, IdentificationError, partial(line_of, decoded(content)))
-    return problem
+    return parse_problem(_FILE.read(path), label(str(path)), Path(path).parent)
 
 
-def parse_problem(content: bytes, file: str) -> ProblemFile:
+def parse_problem(content: bytes, file: str, folder: Path | None = None) -> ProblemFile:
     """Return the problem in the bytes of a TOML file; ``file`` is its name in messages.
 
-    Raises IdentificationError for an invalid file.
+    Raises IdentificationError for an invalid file, and for recordings that are not in its ``folder``.
     """
     problem = validate(ProblemFile, _FILE.parse(content, file), file, IdentificationError, content)
     # Each may be left out, which the layout allows, but not both.
     if not problem.procedure and problem.trajectory is None:
         raise IdentificationError(f"{file}: has neither a [[procedure]] nor a [trajectory]")
-    fitted = () if problem.trajectory is None else problem.trajectory.experiments
-    named = [(f"procedure {number}", item.columns) for number, item in enumerate(problem.procedure, start=1)]
-    named += [(f"experiment '{item.label}'", item.columns) for item in fitted]
-    for user, name in named:
-        if name is not None and name not in problem.columns:
-            names = known_names(name, problem.columns)
-            raise IdentificationError(f"{file}: {user}: there is no column map '{name}'{names}")
+    experiments = () if problem.trajectory is None else problem.trajectory.experiments
+    named = [(f"procedure.{number}", item.columns) for number, item in enumerate(problem.procedure, start=1)]
+    named += [(f"trajectory.experiments.{number}", item.columns) for number, item in enumerate(experiments, start=1)]
+    faults = {
+        f"{table}.columns": f"{table}.columns = {quote(name)}: no such column map{known_names(name, problem.columns)}"
+        for table, name in named
+        if name is not None and name not in problem.columns
+    }
+    recordings = [
+        (f"procedure.{number}.recordings.{place}", name)
+        for number, item in enumerate(problem.procedure, start=1)
+        for place, name in enumerate(item.recordings, start=1)
+    ]
+    recordings += [
+        (f"trajectory.experiments.{number}.recording", item.recording)
+        for number, item in enumerate(experiments, start=1)
+    ]
+    if folder is not None:
+        for key, name in recordings:
+            if not (folder / name).is_file():
+                wrong = "is a folder" if (folder / name).is_dir() else "no such file"
+                near = nearest_name(name, [each.name for each in folder.iterdir()])
+                faults[key] = f"{key} = {quote(name)}: {wrong}{near}"
+    if faults:
+        refuse(faults, file, IdentificationError, partial(line_of, decoded(content)))
     return problem
 
 

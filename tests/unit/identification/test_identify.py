@@ -108,15 +108,6 @@ def test_drop_outs_within_a_decay_are_left_out_before_the_push_is_looked_for(ben
         assert estimate.verdict == "identified"
 
 
-def test_a_valve_map_that_was_swept_one_way_tells_what_its_dead_band_holds(bench: Path, solved: Solve) -> None:
-    one = planted.sweep().recording
-    write_csv(bench / "rising.csv", one.between(0.0, 10.0))
-    remarks = solved(MAP.replace("sweep.csv", "rising.csv")).results[0].remarks
-    assert any("the dead band includes half the width of any hysteresis" in remark for remark in remarks)
-    both = solved(MAP).results[0].remarks
-    assert not any("half of its width" in remark for remark in both)
-
-
 def test_a_discharge_coefficient_above_one_is_doubted(bench: Path, solved: Solve) -> None:
     one = planted.flow().recording
     write_csv(bench / "minutes.csv", one.with_channel("mass_flow", 60.0 * one["mass_flow"], "kg/s"))
@@ -282,8 +273,11 @@ def test_figures_and_files_are_there_for_each_procedure_and_figure_3_for_both(so
         ("", "procedure"),
         (STATIC.replace("static-torque", "static_torqe"), "did you mean 'static-torque'"),
         (f"{STATIC}colums = 'rig'\n", "did you mean 'columns'"),
-        (f"{STATIC}columns = 'rig'\n", "procedure 1: there is no column map 'rig'; available: none"),
-        (STATIC.replace("static.csv", "nowhere.csv"), "nowhere.csv"),
+        (f"{STATIC}columns = 'rig'\n", "line 7: procedure.1.columns = 'rig': no such column map; available: none"),
+        (
+            STATIC.replace("static.csv", "decoy.csv"),
+            "procedure.1.recordings.1 = 'decoy.csv': no such file, did you mean 'decay.csv'",
+        ),
         (STATIC.replace("static.csv", "decay.csv"), "decay.csv: static-torque: needs a channel 'torque [N m]'"),
         (f'{DECAY}start = "2 m"\n', "procedure.1.start = '2 m': unit 'm' does not fit"),
         (f'{DECAY}inertia = "0 kg m^2"\n', "must be above 0 kg m^2"),

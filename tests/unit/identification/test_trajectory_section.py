@@ -297,7 +297,7 @@ pressure_2 = { column = 4, unit = "Pa_a" }
         (FIT.replace('"step-response"', '"step-respons"'), "step-respons"),
         (
             FIT.replace("step.csv", "stop.csv"),
-            "problem.toml: line 15: trajectory.experiments.1.recording = 'stop.csv': there is no such file, did you",
+            "line 15: trajectory.experiments.1.recording = 'stop.csv': no such file, did you mean 'step.csv'",
         ),
         (FIT.replace('"step"', '"Step 1"'), "trajectory.experiments.1.label"),
         (FIT.replace("foot_plate.inertia", "foot_plate.inertial"), "did you mean 'foot_plate.inertia'"),
@@ -306,7 +306,10 @@ pressure_2 = { column = 4, unit = "Pa_a" }
             FIT.replace("2 g m^2", "70 g m^2"),
             "problem.toml: trajectory: foot_plate.inertia: low = 0.07 must be below high = 0.05",
         ),
-        (f"{FIT}columns = 'rig'\n", "experiment 'step': there is no column map 'rig'; available: none"),
+        (
+            f"{FIT}columns = 'rig'\n",
+            "line 17: trajectory.experiments.1.columns = 'rig': no such column map; available: none",
+        ),
         (
             f"{FIT}inputs = ['comand']\n",
             "channel 'comand' is not a measured input, did you mean 'command'",

@@ -192,6 +192,7 @@ def test_a_command_that_only_rises_leaves_hysteresis_out() -> None:
     up = RecordingSource(planted.sweep().recording.between(0.0, 10.0))
     result = valve_map((up,), planted.CO2)
     assert "valve_map.hysteresis" not in [item.path for item in result.estimates]
+    assert any("the dead band includes half the width of any hysteresis" in remark for remark in result.remarks)
 
 
 def test_flow_with_the_wrong_sign_is_told() -> None:
