@@ -274,7 +274,7 @@ def _solved(problem: ProblemFile, folder: Path, file: str, progress: Report) -> 
     from ppafo.identification.trajectory.section import SectionContext, solve_section
     from ppafo.parameters.loading import load_parameter_set
     from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
-    from ppafo.parameters.parameter_set import atmospheric_pressure, chosen_valve
+    from ppafo.parameters.parameter_set import atmospheric_pressure
 
     device = problem.device
     beside = folder / device.set
@@ -283,14 +283,13 @@ def _solved(problem: ProblemFile, folder: Path, file: str, progress: Report) -> 
     check_valve(overrides, device.valve, f"device.valve = '{device.valve}'")
     before = current = with_overrides(base, overrides, device.valve)
     with shown_in(counted_from(before.shown, atmospheric_pressure(before))):
-        valve = chosen_valve(before, device.valve)
         reader = _RecordingReader(problem=problem, folder=folder, file=file, parameter_set=before)
         tasks = _tasks_in_order(reader)
         used = _used_recordings(tasks, file)
         tolerances = problem.bench or DEFAULTS
         results: list[BenchResult] = []
         for task in tasks:
-            context = BenchContext(current, valve, task.label, tolerances)
+            context = BenchContext(current, device.valve, task.label, tolerances)
             results.append(run_procedure(task.sources, task.procedure, context))
             # Each procedure finds the estimates of earlier ones in the set.
             current = with_estimates(current, results[-1].estimates).parameter_set
@@ -298,18 +297,15 @@ def _solved(problem: ProblemFile, folder: Path, file: str, progress: Report) -> 
         trajectory = None
         if problem.trajectory is not None:
             section = SectionContext(
+                *(current, device.valve, f"{file}: trajectory", tolerances),
                 read=reader._replace(parameter_set=current).read_experiment,
                 folder=folder,
-                file=f"{file}: trajectory",
-                parameter_set=current,
-                valve=device.valve,
                 bench={estimate.path: estimate for estimate in estimates},
                 used=used,
-                tolerances=tolerances,
             )
             trajectory = solve_section(problem.trajectory, section, progress)
             estimates += trajectory.estimates
-        new_set = with_estimates(before, estimates, valve)
+        new_set = with_estimates(before, estimates, device.valve)
         identification = Identification(problem.name, tuple(results), trajectory, before, new_set)
         described = replace(new_set, parameter_set=_described_set(identification, problem))
         return replace(identification, new_set=described)

@@ -324,7 +324,7 @@ pressure_2 = { column = 4, unit = "Pa_a" }
         (f"{FIT}time_offset = '5 mm'\n", "time_offset = '5 mm': unit 'mm' does not fit"),
         (f"{FIT}step = '1 min'\n", "step = '1 min': must be at least 1e-06 and at most"),
         (f"{FIT}start = '9 s'\n", "has 0 samples from the start at 9 s on"),
-        (f"{FIT}{STEP}", "experiment 'step' is given twice"),
+        (FIT + STEP.replace("step.csv", "task.csv"), "experiment 'step' is given twice"),
         (f"{FIT}{REPLAYED}inputs = ['supply_pressure']\n", "has no scenario, so inputs must have 'command'"),
         (
             f"{FIT}{REPLAYED}".replace("task.csv", "decay.csv"),

@@ -64,10 +64,10 @@ class BenchResult(Identified):
 
 @dataclass(frozen=True, slots=True)
 class BenchContext:
-    """Context of a bench law: parameter set, chosen valve, ``label`` of the section in messages, bench tolerances."""
+    """Context of a bench law or fit: set, valve (None: the chosen one), ``label`` in messages, bench tolerances."""
 
     parameter_set: ParameterSet
-    valve: str
+    valve: str | None
     label: str
     tolerances: Tolerances = DEFAULTS
 

@@ -9,11 +9,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ppafo.errors import DataError, IdentificationError, ScenarioError
+from ppafo.identification.bench.law import BenchContext
 from ppafo.identification.estimate import Estimate, in_shown_unit, interval_factor
 from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.problem import ExperimentSection, ParameterSection, TrajectorySection
 from ppafo.identification.source import RecordingSource, UsedRecording, double_use, remarks_on_readings
-from ppafo.identification.tolerances import Tolerances, quantity_of
+from ppafo.identification.tolerances import quantity_of
 from ppafo.identification.trajectory.experiment import (
     FITTED_CHANNELS,
     INPUTS,
@@ -36,7 +37,6 @@ from ppafo.identification.trajectory.fitting import (
 )
 from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.overrides import over
-from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.progress import Report
 from ppafo.signals import Recording
 from ppafo.simulation.loading import list_scenarios, load_scenario
@@ -47,30 +47,27 @@ from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.simulation.scenario import Scenario
 
 
-@dataclass(frozen=True, slots=True)
-class SectionContext:
-    """Context of a section: parameter set, recordings and earlier results.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SectionContext(BenchContext):
+    """Context of a section, whose set and valve replace those of all scenarios.
 
     ``read``: function that returns the recording of an experiment. ``folder``: base of relative paths of scenarios.
-    ``file``: name of the section in messages. ``parameter_set`` and ``valve``: replacements for the sets and valves of
-    all scenarios. ``bench``: earlier estimates by path. ``used``: recordings from which these were obtained.
-    ``tolerances``: tolerances of the bench.
+    ``bench``: earlier estimates by path. ``used``: recordings from which these were obtained.
     """
 
     read: Callable[[ExperimentSection], RecordingSource]
     folder: Path
-    file: str
-    parameter_set: ParameterSet
-    valve: str | None
     bench: Mapping[str, Estimate]
     used: tuple[UsedRecording, ...]
-    tolerances: Tolerances
 
 
 def trajectory_problem(section: TrajectorySection, context: SectionContext) -> TrajectoryProblem:
     """Convert a section to a fit problem. Raises IdentificationError for a recording used by a bench procedure."""
     experiments = tuple(_experiment(entry, context) for entry in section.experiments)
     scenarios = {experiment.label: experiment.scenario for experiment in experiments}
+    # Samples that a bench procedure used are in its interval, which is a prior here.
+    if message := double_use((*context.used, *map(use_of, experiments))):
+        raise IdentificationError(f"{context.label}: {message}")
     parameters = [_parameter(entry, scenarios, context) for entry in section.parameters]
     for entry in section.experiments:
         if (limit := entry.time_offset) is not None:
@@ -81,16 +78,12 @@ def trajectory_problem(section: TrajectorySection, context: SectionContext) -> T
             )
     stated = stated_by(context.parameter_set, experiments[0].scenario)
     tolerances = tolerance_parameters(context.tolerances, experiments, parameters, stated)
-    problem = TrajectoryProblem((*parameters, *tolerances), experiments, section.confidence)
-    # Samples that a bench procedure used are in its interval, which is a prior here.
-    if message := double_use((*context.used, *map(use_of, experiments))):
-        raise IdentificationError(f"{context.file}: {message}")
-    return problem
+    return TrajectoryProblem((*parameters, *tolerances), experiments, section.confidence)
 
 
 def _experiment(entry: ExperimentSection, context: SectionContext) -> FittedExperiment:
     """Convert a table of a section to an experiment: recording, and scenario that models it."""
-    where = f"{context.file}: experiment '{entry.label}'"
+    where = f"{context.label}: experiment '{entry.label}'"
     source = context.read(entry)
     if entry.scenario is None:
         scenario, start, inputs = _replay(entry, source.recording, context, where)
@@ -130,7 +123,7 @@ def _parameter(entry: ParameterSection, scenarios: Mapping[str, Scenario], conte
     acting = scenario or next(iter(scenarios.values()))
     quantity = declaration_of(entry.path, acting)
     atmosphere = acting.device.supply.atmospheric_pressure
-    where = f"{context.file}: parameter '{entry.path}'"
+    where = f"{context.label}: parameter '{entry.path}'"
     stated = {key: getattr(entry, key) for key in ("start", "low", "high")}
     start, low, high = (
         math.nan if text is None else quantity_of(f"{where}: {key}", text, quantity.unit, atmosphere)
@@ -192,7 +185,7 @@ def solve_section(section: TrajectorySection, context: SectionContext, report: R
         problem = trajectory_problem(section, context)
         candidates = []
         for entry in section.candidates:
-            where = f"{context.file}: candidate '{entry.label}'"
+            where = f"{context.label}: candidate '{entry.label}'"
             scenario = _scenario(entry.scenario, entry.overrides, context)
             if entry.interval > (longest := scenario.run.duration):
                 raise IdentificationError(f"{where}: interval = {entry.interval:g} s must be at most {longest:g} s")
@@ -201,9 +194,9 @@ def solve_section(section: TrajectorySection, context: SectionContext, report: R
         fitted = fit(problem, report)
         expected = expected_information(fitted, candidates)
     except (IdentificationError, DataError) as error:
-        if str(error).startswith(context.file):
+        if str(error).startswith(context.label):
             raise
-        raise type(error)(f"{context.file}: {error}") from error
+        raise type(error)(f"{context.label}: {error}") from error
     sources = tuple(RecordingSource(experiment.recording, experiment.source) for experiment in problem.experiments)
     remarks = [*remarks_on_readings(sources), *fitted.remarks]
     for estimate in fitted.estimates:
