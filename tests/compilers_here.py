@@ -4,8 +4,8 @@ import sys
 from dataclasses import dataclass, replace
 from types import ModuleType
 
-from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.compilers import OFFERED, Compiler, Effort
+from ppafo.engine.loading import load_generated
 from ppafo.errors import SimulationError
 
 

@@ -7,9 +7,9 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.compilers import Effort
 from ppafo.engine.lanes import BatchResult, LaneBlock, RunnableProgram, run_batch, write_source
+from ppafo.engine.loading import load_generated
 from ppafo.golden_bits import digest, golden_hashes, names, plain_batch
 from ppafo.simulation.loading import list_scenarios
 from ppafo.walking import list_walks

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from ppafo.engine.in_python import in_program
-from ppafo.engine.led_leg import torque_of_leg
 from ppafo.engine.run import Run
 from ppafo.engine.scheme.pneumatics import GasFlows, flow_rates, gas_flows
 from ppafo.engine.scheme.thermal_gas import WarmChambers, WarmGas, thermal_flows, warm_chambers
@@ -139,7 +138,7 @@ def torque_at_rest(run: Run) -> Callable[[Mapping[str, Any], float, float, float
     def torque(states: Mapping[str, Any], time: float, angle: float, pressure_1: float, pressure_2: float) -> float:
         actuator = program.actuator.torque(run.plant, angle, pressure_1, pressure_2)
         alone: float = driving(states, run.plant, actuator, angle)
-        return alone if run.leg is None else alone + torque_of_leg(program, run.leg, time, angle)
+        return alone if program.foot is None else alone + program.foot.torque(program, run.leg, time, angle)
 
     return torque
 

@@ -9,6 +9,7 @@ compiler is left, or a law cannot be translated to C, Python runs the text, and 
 import contextlib
 import logging
 import os
+import sys
 import threading
 import time
 from collections.abc import Iterable
@@ -16,9 +17,8 @@ from functools import cache, lru_cache
 from pathlib import Path
 from types import ModuleType
 
-from ppafo.engine.cache.folder import LEFT_OUT_FOR, cache_folder, refusal
-from ppafo.engine.cache.kept import is_kept
-from ppafo.engine.cache.programs import load_generated, note_name
+from ppafo.engine.cache.folder import CACHE_VARIABLE, LEFT_OUT_FOR, NOTE, cache_folder, refusal
+from ppafo.engine.cache.kept import RequestedProgram, is_kept, load_kept_module, short_hash
 from ppafo.engine.compilers import OFFERED, Compiler, CompilerError, Effort, UntranslatableError
 from ppafo.errors import ProgramError, SimulationError
 from ppafo.wording import nearest_name, one_line
@@ -36,6 +36,7 @@ WITHOUT_C = f"{BACKEND_VARIABLE}={PYTHON} needs no compiler, but is some hundred
 _FAILED: set[str] = set()
 """Identities of compilers that have failed in this process."""
 _LEAVING_OUT = threading.Lock()
+_LOADING: dict[str, threading.RLock] = {}
 
 
 def compilers_to_try() -> tuple[Compiler, ...]:
@@ -78,6 +79,31 @@ def compiled(source: str, effort: Effort = Effort.FULL) -> ModuleType | None:
     and SimulationError if the compiler named by ``PPAFO_BACKEND`` does not work.
     """
     return None if runs_by_python() else _load_by(source, compilers_to_try(), effort)
+
+
+def load_generated(source: str, compiler: Compiler) -> ModuleType:
+    """Import the module with this source, from the cache if available and intact, otherwise after compilation.
+
+    Raises ProgramError if the source cannot be compiled, with the source file of the faulty function, and CompilerError
+    if the compiler does not work.
+    """
+    program = RequestedProgram(source, compiler)
+    # A second thread must not get a module of which only the beginning has run.
+    with _LOADING.setdefault(program.name, threading.RLock()):
+        if program.name in sys.modules:
+            return sys.modules[program.name]
+        cache = cache_folder()
+        # Loading runs what lies there, so the folder is looked at each time, not once for the process.
+        why_not = refusal(cache)
+        folder = None if cache is None or why_not else program.folder_in(cache)
+        if folder is None:
+            logger.warning("ppafo: compiled models are not cached: %s; change %s", why_not, CACHE_VARIABLE)
+        module = None if folder is None else load_kept_module(folder, program)
+        if module is not None:
+            return module
+        from ppafo.engine.cache.making import make  # most programs are there
+
+        return make(program, folder)
 
 
 def runs_by_python() -> bool:
@@ -138,6 +164,11 @@ def _leave_out(failed: Iterable[Compiler], failure: CompilerError) -> None:
             with contextlib.suppress(OSError):
                 (folder / note_name(compiler)).write_text(f"{failure}\n", encoding="utf-8")
     _compilers.cache_clear()
+
+
+def note_name(compiler: Compiler) -> str:
+    """Return the name of the cache file with the reason why a compiler does not work on this computer."""
+    return f"{NOTE}{compiler.name}-{short_hash(compiler.identity())}"
 
 
 def _has_failed(compiler: Compiler, folder: Path | None) -> bool:

@@ -22,10 +22,9 @@ from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, Th
 from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
 
 if TYPE_CHECKING:  # for most runs know no leg, no line and no walk
-    from ppafo.engine.led_leg import LedLeg
     from ppafo.engine.scheme.walking import DeviceShare, WalkState
     from ppafo.model.gait import GaitSeries, GaitTiming
-    from ppafo.model.leg import LegParameters
+    from ppafo.model.leg import FootLoad, LegParameters
     from ppafo.model.regulator import LineState, SupplyLines
 
 Members = NDArray[np.intp]
@@ -79,6 +78,14 @@ class Lines:
 
 
 @dataclass(frozen=True, slots=True)
+class LedLeg:
+    """Foot on a prescribed shank: load that turns about the ankle, and profile of the shank."""
+
+    load: "FootLoad"
+    shank: Any
+
+
+@dataclass(frozen=True, slots=True)
 class Run:
     """Device in one experiment, in SI units.
 
@@ -110,7 +117,7 @@ class Run:
     walk: Walk | None = None
     lines: Lines | None = None
     effects: tuple[Any, ...] = ()
-    leg: "LedLeg | None" = None
+    leg: LedLeg | None = None
 
     @property
     def period(self) -> float:

@@ -190,8 +190,11 @@ def force_reading(sensors: GaitSensors, force: float, seed: int, sample: int, ch
 
 
 def hold_if_lost(last: float, reading: float, lost_share: float, seed: int, sample: int, channel: int) -> float:
-    """Reading, or the last reading if the sample is lost, in the same unit; ``lost_share`` [-] is the probability."""
-    return last if unit_noise(seed, sample, channel) < lost_share else reading
+    """Reading, or the last reading if the sample is lost, in the same unit; ``lost_share`` [-] is the probability.
+
+    The first sample is never lost.
+    """
+    return last if sample > 0 and unit_noise(seed, sample, channel) < lost_share else reading
 
 
 def measure_gait(
@@ -221,16 +224,11 @@ def measure_gait(
     seen = measure(sensors, smooth_angle, smooth_1, smooth_2, plant, sample, parts=parts)
     heel = force_reading(gait_sensors, heel_force, seed, sample, 3)
     toe = force_reading(gait_sensors, toe_force, seed, sample, 4)
-    was_angle = last.angle if sample > 0 else seen.angle
-    was_1 = last.pressure_1 if sample > 0 else seen.pressure_1
-    was_2 = last.pressure_2 if sample > 0 else seen.pressure_2
-    was_heel = last.heel_force if sample > 0 else heel
-    was_toe = last.toe_force if sample > 0 else toe
-    seen_angle = hold_if_lost(was_angle, seen.angle, gait_sensors.angle_lost_share, seed, sample, 7)
-    seen_1 = hold_if_lost(was_1, seen.pressure_1, gait_sensors.pressure_lost_share, seed, sample, 8)
-    seen_2 = hold_if_lost(was_2, seen.pressure_2, gait_sensors.pressure_lost_share, seed, sample, 9)
-    seen_heel = hold_if_lost(was_heel, heel, gait_sensors.lost_share, seed, sample, 5)
-    seen_toe = hold_if_lost(was_toe, toe, gait_sensors.lost_share, seed, sample, 6)
+    seen_angle = hold_if_lost(last.angle, seen.angle, gait_sensors.angle_lost_share, seed, sample, 7)
+    seen_1 = hold_if_lost(last.pressure_1, seen.pressure_1, gait_sensors.pressure_lost_share, seed, sample, 8)
+    seen_2 = hold_if_lost(last.pressure_2, seen.pressure_2, gait_sensors.pressure_lost_share, seed, sample, 9)
+    seen_heel = hold_if_lost(last.heel_force, heel, gait_sensors.lost_share, seed, sample, 5)
+    seen_toe = hold_if_lost(last.toe_force, toe, gait_sensors.lost_share, seed, sample, 6)
     remembered = GaitSeen(
         heel_force=seen_heel,
         toe_force=seen_toe,

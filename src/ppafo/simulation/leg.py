@@ -3,25 +3,43 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.catalog import PROFILES
+from ppafo.control.kind import ProfileKind
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.in_python import over_samples
 from ppafo.engine.lanes import Floats
-from ppafo.engine.led_leg import GAIT_SHANK, LedLeg, shank_over_samples
-from ppafo.engine.run import Run
+from ppafo.engine.run import LedLeg, Run
 from ppafo.model.columns import Problem
-from ppafo.model.gait import ShankSeries, foot_in_gait
-from ppafo.model.leg import FootLoad, torque_on_foot
+from ppafo.model.gait import ShankSeries, foot_in_gait, shank_in_gait
+from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
 from ppafo.model.plant import PlantParameters
 from ppafo.simulation.motion_kind import Measured
 from ppafo.simulation.plan import CarriedLeg, plan_vane
 from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import Leg, Scenario, vane_motion
 from ppafo.simulation.vane_recording import measured, net_torques
+
+GAIT_SHANK = ProfileKind(
+    name="gait",
+    summary="The shank of a gait, whose ground is left out.",
+    quantities=(),
+    parameters=ShankSeries,
+    value=shank_in_gait,
+)
+"""Shank with a moving knee, whose value is a ``ShankNow``; with any other profile of the shank, the knee is at rest."""
+
+
+def shank_over_samples(kind: ProfileKind, shank: Any, times: Floats) -> Any:
+    """Shank motion at times [s]: a ``ShankNow`` of columns (samples,), or of single numbers if constant."""
+    if kind is GAIT_SHANK:
+        return over_samples(shank_in_gait, shank, times)
+    angle, rate, acceleration = over_samples(kind.value, shank, times)
+    return ShankNow(angle, rate, acceleration, knee_forward=0.0, knee_up=0.0)
 
 
 def on_gait(leg: Leg, name: str, folder: Path) -> Leg:

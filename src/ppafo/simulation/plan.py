@@ -7,7 +7,7 @@ them in C.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from ppafo.control.catalog import PROFILES
 from ppafo.control.kind import ProfileKind
 from ppafo.engine.program import Program
 from ppafo.engine.rows import rebuilt
-from ppafo.engine.run import Lines, Run, Walk
+from ppafo.engine.run import LedLeg, Lines, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE, is_slow
 from ppafo.engine.step.lane import NoParameters
@@ -33,9 +33,6 @@ from ppafo.parameters.plant import first_settings, plant_parameters, valve_setti
 from ppafo.simulation.clock import MAXIMUM_STEPS
 from ppafo.simulation.profiles import profile_bounds, profile_parameters
 from ppafo.simulation.scenario import GasModel, Scenario, vane_motion
-
-if TYPE_CHECKING:
-    from ppafo.engine.led_leg import LedLeg
 
 WHOLE = 1.0e-9
 """Relative difference up to which a number of steps counts as an integer."""

@@ -12,8 +12,8 @@ from ppafo import golden_bits
 from ppafo.cli import doctor
 from ppafo.cli.main import completion_script, main
 from ppafo.engine import loading
-from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.cache.tidying import list_programs
+from ppafo.engine.loading import load_generated
 from ppafo.loading import load_scenario
 from ppafo.simulation import simulate
 from tests.compilers_here import first_compiler

@@ -11,10 +11,10 @@ import pytest
 from ppafo.engine import loading
 from ppafo.engine.cache import making
 from ppafo.engine.cache.making import announce, load_all
-from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.cache.tidying import list_programs
 from ppafo.engine.compilers import Effort
 from ppafo.engine.lanes import Batch, effort_for
+from ppafo.engine.loading import load_generated
 from ppafo.golden_bits import plain_batch
 from tests.compilers_here import ScriptCompiler
 

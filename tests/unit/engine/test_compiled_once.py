@@ -7,12 +7,12 @@ import time
 from pathlib import Path
 
 from ppafo.engine.cache.folder import LOCK
-from ppafo.engine.cache.programs import load_generated
+from ppafo.engine.loading import load_generated
 from tests.compilers_here import ScriptCompiler
 
 LOAD_ONE = """
 import sys
-from ppafo.engine.cache.programs import load_generated
+from ppafo.engine.loading import load_generated
 from tests.compilers_here import ScriptCompiler
 load_generated(sys.stdin.read(), ScriptCompiler(says=True))
 """

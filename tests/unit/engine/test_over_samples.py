@@ -8,11 +8,11 @@ import pytest
 
 from ppafo.control import profiles
 from ppafo.engine.in_python import over_samples
-from ppafo.engine.led_leg import shank_over_samples
 from ppafo.engine.rows import leaves, rebuilt
 from ppafo.model.elementary import exponential, sine_and_cosine_of_turns
 from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot, torque_on_resting_foot
 from ppafo.model.plant import direction_of
+from ppafo.simulation.leg import shank_over_samples
 
 COLUMN = np.concatenate([[0.0, -0.0, 0.25, 0.5, 1.0, 2.0], np.random.default_rng(1).uniform(-3.0, 3.0, 200)])
 KNOTS = np.concatenate([[0.0, 1.0], np.ravel([(0.1 * place, (-1.0) ** place) for place in range(1, 32)])])

@@ -13,8 +13,8 @@ import pytest
 from ppafo.engine.cache import folder as private
 from ppafo.engine.cache.folder import cache_folder, refusal
 from ppafo.engine.cache.kept import is_whole
-from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.cache.tidying import clear, evict, list_programs
+from ppafo.engine.loading import load_generated
 from ppafo.translation import native
 from tests.compilers_here import first_compiler
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.entries import INLINE
+from ppafo.engine.loading import load_generated
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import PpafoError, ProgramError
 from tests.compilers_here import first_compiler

@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from ppafo.engine import loading
-from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.cache.tidying import list_programs
 from ppafo.engine.compilers import CompilerError
 from ppafo.engine.lanes import Batch, load_program, run_batch
+from ppafo.engine.loading import load_generated
 from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError, SimulationError
 from ppafo.golden_bits import digest

@@ -18,7 +18,6 @@ from ppafo.control.torque_loop import SHARPNESS
 from ppafo.engine.continuous_time import free_motion, gas_rates, mode_at_rest, torque_at_rest
 from ppafo.engine.in_python import PythonFunctions, functions_of, in_program
 from ppafo.engine.lanes import Floats, run_batch
-from ppafo.engine.led_leg import torque_of_leg
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of, state_row_numbers
@@ -332,7 +331,7 @@ class LinearisedPlant:
         rates = {}
         # A vane that is held or prescribed has no acceleration: angle and velocity are no states then.
         if self.direction:
-            added = 0.0 if run.leg is None else torque_of_leg(program, run.leg, self.time, motion[0])
+            added = program.foot.torque(program, run.leg, self.time, motion[0]) if program.foot is not None else 0.0
             moved = call(free_motion)(plant, *motion, *pressures, added, self.direction, parts=program.functions)
             rates = dict(zip(_MOTION, moved, strict=True))
         rates |= {"pressure_1": gas.pressure_1, "pressure_2": gas.pressure_2}

@@ -24,6 +24,7 @@ A rigid chamber has ``x`` 0 (docs/equations.md).
 import math
 from typing import NamedTuple
 
+from ppafo.engine.composer import each
 from ppafo.engine.scheme.pneumatics import (
     GAMMA,
     Flows,
@@ -137,17 +138,6 @@ def steeper_roots(gas: WarmGas, flowing: SlopedFlows, per_content_1: float, per_
     )
 
 
-def mass_ratios(roots: PathRatios) -> PathRatios:
-    """Mass flow in each path over that at the reference temperature [-]."""
-    return PathRatios(
-        source_1=mass_flow_ratio(roots.source_1),
-        vent_1=mass_flow_ratio(roots.vent_1),
-        source_2=mass_flow_ratio(roots.source_2),
-        vent_2=mass_flow_ratio(roots.vent_2),
-        leak=mass_flow_ratio(roots.leak),
-    )
-
-
 def enthalpy_ratios(thermal: ThermalParameters, roots: PathRatios) -> PathRatios:
     """Content that the gas in each path carries, over its mass flow at the reference temperature [-]."""
     ratio = thermal.heat_capacity_ratio
@@ -213,7 +203,7 @@ def thermal_flows(thermal: ThermalParameters, gas: WarmGas, at: WarmChambers, fl
     return ThermalFlows(
         mass_1=content_rate(thermal, energy.mass_1, work_1, heat_1, at.give_1),
         mass_2=content_rate(thermal, energy.mass_2, work_2, heat_2, at.give_2),
-        gas=flow_rates(carried(flowing, mass_ratios(roots))),
+        gas=flow_rates(carried(flowing, each(mass_flow_ratio, roots))),
         energy=energy,
         heat=heat_1 + heat_2,
     )
@@ -280,7 +270,7 @@ def thermal_matrix(
     per_content_1 = plant.gas_product / (at.volume_1 * (1.0 + at.give_1))
     per_content_2 = plant.gas_product / (at.volume_2 * (1.0 + at.give_2))
     roots = steeper_roots(gas, flowing, per_content_1, per_content_2)
-    by_mass = linearise(per_content_1, per_content_2, carried_slopes(flowing, mass_ratios(roots)), step)
+    by_mass = linearise(per_content_1, per_content_2, carried_slopes(flowing, each(mass_flow_ratio, roots)), step)
     by_energy = linearise(per_content_1, per_content_2, carried_slopes(flowing, enthalpy_ratios(thermal, roots)), step)
     cooling_1 = weight * thermal.wall_exchange * at.volume_1 / gas.mass_1
     cooling_2 = weight * thermal.wall_exchange * at.volume_2 / gas.mass_2

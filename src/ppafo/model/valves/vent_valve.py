@@ -46,25 +46,20 @@ def advance_ideal(
     return VentedOpening(opening, 1.0 if command > VENTS_ABOVE else 0.0), after
 
 
+def vented_port(plant: PlantParameters, port: SinglePort, vents: bool) -> SinglePort:
+    """Port of a chamber, or its open path to the atmosphere through the vent valve."""
+    return SinglePort(
+        conductance=plant.valve_conductance if vents else port.conductance,
+        node_pressure=plant.atmospheric_pressure if vents else port.node_pressure,
+        source_fraction=0.0 if vents else port.source_fraction,
+        is_relieving=1.0 if vents else port.is_relieving,
+    )
+
+
 def connect_ideal(plant: PlantParameters, shown: VentedOpening) -> tuple[SinglePort, SinglePort]:
     """Ports of both chambers, by equation (8), with the vent valve open or closed."""
     port_1, port_2 = single_ports(plant, shown.opening)
-    vents = shown.vents > 0.5
-    full, room = plant.valve_conductance, plant.atmospheric_pressure
-    return (
-        SinglePort(
-            conductance=full if vents else port_1.conductance,
-            node_pressure=room if vents else port_1.node_pressure,
-            source_fraction=0.0 if vents else port_1.source_fraction,
-            is_relieving=1.0 if vents else port_1.is_relieving,
-        ),
-        SinglePort(
-            conductance=full if vents else port_2.conductance,
-            node_pressure=room if vents else port_2.node_pressure,
-            source_fraction=0.0 if vents else port_2.source_fraction,
-            is_relieving=1.0 if vents else port_2.is_relieving,
-        ),
-    )
+    return vented_port(plant, port_1, shown.vents > 0.5), vented_port(plant, port_2, shown.vents > 0.5)
 
 
 def instant_ideal(valve: IdealProportional, state: NoValveState, command: float) -> Openings:
