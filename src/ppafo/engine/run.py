@@ -237,7 +237,7 @@ def states_at_start(run: Run) -> list[Any]:
     if not program.effect_states:
         return []
     pressures = pressures_of(program.actuator, run.plant, initial.angle, initial.mass_1, initial.mass_2)
-    now = _at_rest(initial, *pressures)
+    now = PlantSnapshot(initial.angle, initial.angular_velocity, *pressures)
     return [
         effect.state.row() if effect.state.start is None else of_each(effect.state.start, row, now)
         for effect, row in zip(program.effects, run.effects, strict=True)
@@ -248,20 +248,7 @@ def states_at_start(run: Run) -> list[Any]:
 def moment_at_start(plant: PlantParameters, initial: PlantState, *, parts: ActuatorFunctions) -> PlantSnapshot:
     """Return the motion and pressures, without flow, from which effect laws compute their initial states."""
     pressure_1, pressure_2 = parts.pressures(plant, initial.angle, initial.mass_1, initial.mass_2)
-    return _at_rest(initial, pressure_1, pressure_2)
-
-
-def _at_rest(initial: PlantState, pressure_1: float, pressure_2: float) -> PlantSnapshot:
-    """Return the input of effect laws for absolute pressures [Pa], zero flows and zero command."""
-    return PlantSnapshot(
-        angle=initial.angle,
-        angular_velocity=initial.angular_velocity,
-        pressure_1=pressure_1,
-        pressure_2=pressure_2,
-        supplied_flow=0.0,
-        vented_flow=0.0,
-        command=0.0,
-    )
+    return PlantSnapshot(initial.angle, initial.angular_velocity, pressure_1, pressure_2)
 
 
 def run_together(runs: Sequence[Run], threads: int | None = None) -> list[BatchResult]:

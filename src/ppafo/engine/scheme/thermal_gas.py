@@ -104,37 +104,23 @@ class PathRatios(NamedTuple):
     leak: float
 
 
-def upstream_roots(gas: WarmGas, flowing: GasFlows) -> PathRatios:
-    """Roots ``sqrt(T / T_0)`` of the gas in each path [-], according to the direction of its flow."""
+def upstream_roots(gas: WarmGas, flowing: GasFlows, turns_1: float, turns_2: float) -> PathRatios:
+    """Roots ``sqrt(T / T_0)`` of the gas in each path [-]; the larger of both sides in a vent whose flow may reverse.
+
+    ``turns_1`` and ``turns_2`` [kg/s] are the flows through the vents below which they may reverse within a step. When
+    the flow of a settled chamber reverses, outflowing cold gas becomes inflowing warm gas, more than the matrix
+    assumes. A matrix that is too steep damps this error; a matrix that is too flat lets the error grow from step to
+    step.
+    """
     root_1, root_2 = math.sqrt(gas.content_1 / gas.mass_1), math.sqrt(gas.content_2 / gas.mass_2)
     in_1, in_2 = flowing.in_1, flowing.in_2
+    vent_1, vent_2 = in_1.total - in_1.from_source, in_2.total - in_2.from_source
     return PathRatios(
         source_1=1.0 if in_1.from_source >= 0.0 else root_1,
-        vent_1=1.0 if in_1.total - in_1.from_source >= 0.0 else root_1,
+        vent_1=max(1.0, root_1) if abs(vent_1) < turns_1 else (1.0 if vent_1 >= 0.0 else root_1),
         source_2=1.0 if in_2.from_source >= 0.0 else root_2,
-        vent_2=1.0 if in_2.total - in_2.from_source >= 0.0 else root_2,
+        vent_2=max(1.0, root_2) if abs(vent_2) < turns_2 else (1.0 if vent_2 >= 0.0 else root_2),
         leak=root_1 if flowing.leak >= 0.0 else root_2,
-    )
-
-
-def steeper_roots(gas: WarmGas, flowing: SlopedFlows, per_content_1: float, per_content_2: float) -> PathRatios:
-    """Roots as ``upstream_roots``; the larger value of both sides in a vent whose flow may reverse within the step.
-
-    When the flow of a settled chamber reverses, outflowing cold gas becomes inflowing warm gas, more than the matrix
-    assumes. A matrix that is too steep damps this error; a matrix that is too flat lets the error grow from step to
-    step. Pressures divided by contents are in Pa/kg.
-    """
-    flows = flowing.flows
-    roots = upstream_roots(gas, flows)
-    slope_1 = flowing.slopes_1.total - flowing.slopes_1.from_source
-    slope_2 = flowing.slopes_2.total - flowing.slopes_2.from_source
-    turns_1 = abs(slope_1) * (NEARLY_EQUAL * per_content_1 * gas.content_1)
-    turns_2 = abs(slope_2) * (NEARLY_EQUAL * per_content_2 * gas.content_2)
-    steeper_1 = max(1.0, math.sqrt(gas.content_1 / gas.mass_1))
-    steeper_2 = max(1.0, math.sqrt(gas.content_2 / gas.mass_2))
-    return roots._replace(
-        vent_1=steeper_1 if abs(flows.in_1.total - flows.in_1.from_source) < turns_1 else roots.vent_1,
-        vent_2=steeper_2 if abs(flows.in_2.total - flows.in_2.from_source) < turns_2 else roots.vent_2,
     )
 
 
@@ -192,7 +178,7 @@ def content_rate(thermal: ThermalParameters, entering: float, work: float, heat:
 
 def thermal_flows(thermal: ThermalParameters, gas: WarmGas, at: WarmChambers, flowing: GasFlows) -> ThermalFlows:
     """All rates of gas with an energy balance [kg/s], from the flows at the reference temperature [kg/s]."""
-    roots = upstream_roots(gas, flowing)
+    roots = upstream_roots(gas, flowing, 0.0, 0.0)
     energy = flow_rates(carried(flowing, enthalpy_ratios(thermal, roots)))
     heat_1 = wall_rate(thermal, at.volume_1, gas.content_1, gas.mass_1)
     heat_2 = wall_rate(thermal, at.volume_2, gas.content_2, gas.mass_2)
@@ -269,7 +255,11 @@ def thermal_matrix(
     ratio, weight = thermal.heat_capacity_ratio, GAMMA * step
     per_content_1 = plant.gas_product / (at.volume_1 * (1.0 + at.give_1))
     per_content_2 = plant.gas_product / (at.volume_2 * (1.0 + at.give_2))
-    roots = steeper_roots(gas, flowing, per_content_1, per_content_2)
+    vented_1 = abs(flowing.slopes_1.total - flowing.slopes_1.from_source)
+    vented_2 = abs(flowing.slopes_2.total - flowing.slopes_2.from_source)
+    turns_1 = vented_1 * (NEARLY_EQUAL * per_content_1 * gas.content_1)
+    turns_2 = vented_2 * (NEARLY_EQUAL * per_content_2 * gas.content_2)
+    roots = upstream_roots(gas, flowing.flows, turns_1, turns_2)
     by_mass = linearise(per_content_1, per_content_2, carried_slopes(flowing, each(mass_flow_ratio, roots)), step)
     by_energy = linearise(per_content_1, per_content_2, carried_slopes(flowing, enthalpy_ratios(thermal, roots)), step)
     cooling_1 = weight * thermal.wall_exchange * at.volume_1 / gas.mass_1

@@ -19,17 +19,17 @@ SECTION = "effects"
 class PlantSnapshot(NamedTuple):
     """State of the plant on which an effect depends: angle [rad], its rate [rad/s], absolute pressures [Pa].
 
-    Flows [kg/s] from the supplies and to the atmosphere, and the valve command [-]. For a completed step both snapshots
-    contain the mean flows of the step.
+    Flows [kg/s] from the supplies and to the atmosphere, and the valve command [-], 0 before the first step. For a
+    completed step both snapshots contain the mean flows of the step.
     """
 
     angle: float
     angular_velocity: float
     pressure_1: float
     pressure_2: float
-    supplied_flow: float
-    vented_flow: float
-    command: float
+    supplied_flow: float = 0.0
+    vented_flow: float = 0.0
+    command: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

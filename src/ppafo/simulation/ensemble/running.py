@@ -2,21 +2,22 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
 from ppafo.control.kind import PythonController
 from ppafo.engine.compilers import Effort
 from ppafo.engine.lanes import Batch, BatchResult, Count, Floats, load_programs, run_blocks
-from ppafo.engine.metering import add_meters, meters_of
-from ppafo.engine.rows import group_of
+from ppafo.engine.program import Program
+from ppafo.engine.rows import group_of, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError
 from ppafo.metrics import METRICS, has_channels
 from ppafo.metrics.gas import WITH_ENERGY_BALANCE
 from ppafo.metrics.metric import MetricKind, Readings
 from ppafo.progress import report_nothing
+from ppafo.signals.meter import MeterKind
 from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.python_controller import run_sampled
 from ppafo.simulation.scenario import Scenario
@@ -176,3 +177,23 @@ def intervals(batch: Batch) -> Floats:
     """Time between two samples [s] of each run of a batch without meters."""
     timing = group_of("timing", batch.program.parameter_rows(), batch.parameters)
     return np.asarray(timing.step * batch.clock.record_every)
+
+
+def add_meters(batch: Batch, meters: Sequence[MeterKind], traced: Sequence[str], trace_every: int) -> Batch:
+    """Return the batch with meters at every sample that it would have recorded, and without recording.
+
+    The ``traced`` channels are stored every ``trace_every`` samples, 0 for never.
+    """
+    program = replace(batch.program, meters=tuple(meters), traced=tuple(traced))
+    clock = replace(batch.clock, record_every=0, measure_every=batch.clock.record_every, trace_every=trace_every)
+    rows = len(row_numbers(program.state_rows()))
+    # Meters begin with zeros; their first sample fills them.
+    states = np.zeros((rows, batch.states.shape[1]))
+    states[: batch.states.shape[0]] = batch.states
+    return Batch(program, clock, batch.parameters, states)
+
+
+def meters_of(program: Program, states: Floats) -> dict[str, Any]:
+    """Return the final state of each meter by name, from final states (rows, runs): arrays (runs,) in meter units."""
+    groups = program.state_rows()
+    return {kind.name: group_of(group, groups, states) for group, kind in program.meter_groups.items()}
