@@ -32,21 +32,31 @@ SHORT_NAME = r"^[a-z0-9][a-z0-9_-]{0,99}$"
 FREE_KEY = r"^[A-Za-z0-9_-]+$"
 """Pattern of a free key: a dotted path names it, so a dot or a blank in it would make it another path."""
 JOINT_WORDS = r"^[a-z][a-z ]{0,39}$"
+LABEL = r"^(?=.{1,100}$)[^\x00-\x20\x7f-\xa0](?:[^\x00-\x1f\x7f-\x9f]*[^\x00-\x20\x7f-\xa0])?$"
+"""Pattern of a display name."""
 RULES = {
     NAME: NAME_RULE,
     SHORT_NAME: f"{NAME_RULE}, at most 100",
     FREE_KEY: "must consist of letters, digits, '-' and '_'",
     JOINT_WORDS: "must consist of lower-case letters and blanks, at most 40",
+    LABEL: "must be one line of text without leading or trailing spaces, of at most 100 characters",
 }
 """Message endings for a text that does not match a pattern, by pattern."""
-_FORMS: Mapping[type, str] = {str: "a text in quotation marks", bool: "true or false", dict: "a table of texts"}
+_FORMS: Mapping[type, str] = {
+    str: "a text in quotation marks",
+    bool: "true or false",
+    dict: "a table of texts",
+    float: "a finite number, or a text with its unit",
+}
+_TAKEN: Mapping[type, Any] = {float: str | int | float}
 
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """Field that is no number: a text, true or false, or (``form`` dict) a table of texts with keys of any kind.
+    """Field that is no number in a known unit: a text, true or false, or another ``form``.
 
-    A ``default`` is the value of a ``kind`` that may be omitted.
+    With ``form`` dict it is a table of texts with keys of any kind, with float a number or a text with its unit. A
+    ``default`` is the value of a ``kind`` that may be omitted.
     """
 
     summary: str = ""
@@ -70,13 +80,17 @@ class InnerTable:
 
 @dataclass(frozen=True, slots=True)
 class Many:
-    """List of at least ``least`` values of one field, or of tables, whose fields ``of`` returns for each."""
+    """List of at least ``least`` values of one field, or of tables, whose fields ``of`` returns for each.
+
+    A file may have one of the ``words`` in place of the list.
+    """
 
     of: "Quantity | Words | Declare"
     summary: str = ""
     required: bool = False
     least: int = 0
     most: float = math.inf
+    words: tuple[str, ...] = ()
 
 
 Field = Quantity | Words | InnerTable | Many
@@ -246,14 +260,15 @@ class FieldLayout:
                     ).faults(item, at)
                 else:
                     yield at, f"{at} = {quote(item)} must be a table, [[{path}]]"
-        elif isinstance(field, Many):
+        elif isinstance(field, Many) and not (isinstance(value, str) and value in field.words):
             of, count = field.of, f"{field.least} or more " * (field.least > 0)
             what = (
                 "numbers" if isinstance(of, Quantity) else "texts" if isinstance(of, Words) else f"tables, [[{path}]]"
             )
             most = f", at most {field.most:g}" * math.isfinite(field.most)
-            yield path, f"{path} = {quote(value)} must be a list of {count}{what}{most}"
-        elif fault := self._of_value(path, field, value):
+            word = "".join(f", or '{word}'" for word in field.words)
+            yield path, f"{path} = {quote(value)} must be a list of {count}{what}{most}{word}"
+        elif not isinstance(field, Many) and (fault := self._of_value(path, field, value)):
             yield path, fault
 
     def _gaps(self, path: str, is_given: bool = False) -> Iterator[tuple[str, str]]:
@@ -285,7 +300,10 @@ class FieldLayout:
             hint = nearest_kind(str(value), names) if is_kind else nearest_name(str(value), names, 0.75)
             hint = ", without quotation marks" if str(value) in names else hint
             return f"{given} is not {'known' if is_kind else 'allowed'}{hint}; allowed: {', '.join(names)}"
-        if not isinstance(value, field.form):
+        is_taken = isinstance(value, _TAKEN.get(field.form, field.form)) and isinstance(value, bool) == (
+            field.form is bool
+        )
+        if not is_taken or (isinstance(value, float) and not math.isfinite(value)):
             return f"{given} must be {_FORMS[field.form]}{': ' * bool(field.summary)}{field.summary}"
         for name, item in value.items() if isinstance(value, dict) else ():
             if not (isinstance(name, str) and isinstance(item, str)):
@@ -410,11 +428,13 @@ def _schema(
             else _table_schema(of, {}, "", definitions)
         )
         form = {"type": "array", "items": items, "minItems": field.least}
+        form = {"anyOf": [form, {"enum": list(field.words)}]} if field.words else form
     elif isinstance(field, Words):
         texts: dict[str, Any] = {"type": "string"} | ({"pattern": field.pattern} if field.pattern else {})
         texts |= {"minLength": 1} if field.required and field.is_filled and not field.pattern else {}
         forms: dict[type, dict[str, Any]] = {
             bool: {"type": "boolean"},
+            float: {"type": ["string", "number"]},
             dict: {"type": "object", "additionalProperties": texts},
         }
         form = {"enum": list(field.allowed)} if field.allowed else forms.get(field.form, texts)

@@ -1,16 +1,15 @@
-"""Layout of a study file: configurations, varied paths, sampling, and outputs of each run.
+"""Content of a study file: configurations, varied paths, sampling, and outputs of each run.
 
 Values are texts with their unit, as in a scenario file; ``loading`` converts them, because the unit depends on the path
 of a value.
 """
 
+from collections.abc import Mapping
 from functools import partial
-from typing import Annotated, Literal, get_args
+from typing import Any, NamedTuple
 
-from pydantic import Field
-
-from ppafo.documents.models import LABEL, SchemaVersion, StrictTable, Text, Texts, make_schema
-from ppafo.documents.toml_text import NAME
+from ppafo.model.declaration import Quantity
+from ppafo.parameters.declared import KIND, LABEL, SHORT_NAME, Field, Fields, Many, Words, inside, schema_of
 from ppafo.simulation.scenario import LARGEST_SEED
 
 MAXIMUM_RUNS = 2**32
@@ -21,192 +20,122 @@ DEFAULT_SEED = 1
 """Default random seed of the draws of a study."""
 MAXIMUM_GRID_VALUES = 1_000_000
 """Largest number of values of a grid axis; all of them are computed before the first run."""
-DEFAULT_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-"""Default quantiles: the central 90 % of the runs, the central 50 %, and the median."""
-
-_Value = Annotated[str | float | int, Field(description="text with unit; a plain number if there is no unit")]
-_Values = Annotated[tuple[_Value, ...], Field(strict=False, min_length=1)]
+SAME_AS = "same_as"
+NOT_RANDOM = (SAME_AS, "grid", "list")
+"""Kinds of ``[[vary]]`` that are not distributions."""
 
 
-class ConfigurationSection(StrictTable):
-    """Section of a study file for one configuration: scenario and overrides; all configurations get the same draws."""
-
-    name: Annotated[str, Field(pattern=LABEL, max_length=100, description="label in tables and figures")]
-    scenario: Annotated[Text, Field(description="name of a scenario, or a path relative to this file")]
-    overrides: Annotated[Texts, Field(description="such as 'valve.area=12.6mm^2'")] = ()
+def _whole(summary: str, least: int, most: int, optional: bool = True) -> Quantity:
+    return Quantity("", "", summary, None, least, most, optional=optional, whole=True)
 
 
-class _Varying(StrictTable):
-    path: Annotated[Text, Field(description="what is varied: a path as for --set, such as 'supply.pressure'")]
-    only: Annotated[Texts, Field(description="names of the configurations in which it varies; default: all")] = ()
+_VALUE = Words("", True, form=float)
+_VALUES = Many(_VALUE, "explicit values", True, 1)
+_SEED = _whole("", 0, LARGEST_SEED)
+_BOUNDS: Fields = {"minimum": _VALUE, "maximum": _VALUE}
 
 
-class _Bounded(_Varying):
-    minimum: _Value
-    maximum: _Value
+class VaryKind(NamedTuple):
+    """Kind of ``[[vary]]``: its meaning, and its keys beside those of all kinds."""
+
+    summary: str
+    fields: Fields
 
 
-class Grid(_Varying):
-    """Grid of values of a path, equally spaced on a linear or logarithmic scale, ends included."""
-
-    kind: Literal["grid"]
-    first: _Value
-    last: _Value
-    count: Annotated[int, Field(ge=2, le=MAXIMUM_GRID_VALUES, description="number of values")]
-    spacing: Annotated[Literal["linear", "logarithmic"], Field(description="default: linear")] = "linear"
-
-
-class Listed(_Varying):
-    """Explicit list of values of a path; combined with every value of all other lists and grids."""
-
-    kind: Literal["list"]
-    values: _Values
-
-
-class Uniform(_Bounded):
-    """Uniform distribution of a varied path between two bounds."""
-
-    kind: Literal["uniform"]
-
-
-class LogUniform(_Bounded):
-    """Distribution whose logarithm is uniform between the logarithms of two bounds above 0."""
-
-    kind: Literal["log_uniform"]
-
-
-class Normal(_Varying):
-    """Normal distribution of a varied path, given by mean and standard deviation."""
-
-    kind: Literal["normal"]
-    mean: _Value
-    standard_deviation: _Value
-
-
-class TruncatedNormal(_Bounded):
-    """Normal distribution truncated to two bounds; mean and standard deviation are the values before truncation."""
-
-    kind: Literal["truncated_normal"]
-    mean: _Value
-    standard_deviation: _Value
+KINDS: Mapping[str, VaryKind] = {
+    SAME_AS: VaryKind(
+        "the value of another varied path in every run", {SAME_AS: Words("a path that varies in this study", True)}
+    ),
+    "grid": VaryKind(
+        "values equally spaced on a linear or logarithmic scale, ends included",
+        {
+            "first": _VALUE,
+            "last": _VALUE,
+            "count": _whole("number of values", 2, MAXIMUM_GRID_VALUES, optional=False),
+            "spacing": Words("default: linear", allowed=("linear", "logarithmic")),
+        },
+    ),
+    "list": VaryKind("values, each combined with every value of all other lists and grids", {"values": _VALUES}),
+    "uniform": VaryKind("uniform distribution between two bounds", _BOUNDS),
+    "log_uniform": VaryKind("distribution whose logarithm is uniform between two bounds above 0", _BOUNDS),
+    "normal": VaryKind("normal distribution", {"mean": _VALUE, "standard_deviation": _VALUE}),
+    "truncated_normal": VaryKind(
+        "normal distribution truncated to two bounds; mean and standard deviation are those before truncation",
+        {**_BOUNDS, "mean": _VALUE, "standard_deviation": _VALUE},
+    ),
+    "log_normal": VaryKind(
+        "log-normal distribution",
+        {
+            "median": _VALUE,
+            "factor": Quantity(
+                "", "", "geometric standard deviation, above 1", minimum=1.0, minimum_allowed=False, plain=True
+            ),
+        },
+    ),
+    "triangular": VaryKind("density that rises linearly to the mode and falls from there", {**_BOUNDS, "mode": _VALUE}),
+    "choice": VaryKind(
+        "one of the values, by weights that are equal by default",
+        {"values": _VALUES, "weights": Many(Quantity("", "", "", plain=True), "one weight for each value")},
+    ),
+    "whole_numbers": VaryKind(
+        "whole numbers, bounds included, all as likely; for seeds of sensor noise", {"minimum": _SEED, "maximum": _SEED}
+    ),
+    "stated": VaryKind("normal distribution from the uncertainty that the parameter set states", {}),
+}
+"""Kinds of ``[[vary]]``; ``distributions`` has the quantile functions of the random ones."""
 
 
-class LogNormal(_Varying):
-    """Log-normal distribution given by its median and its geometric standard deviation."""
-
-    kind: Literal["log_normal"]
-    median: _Value
-    factor: Annotated[float, Field(gt=1.0, description="geometric standard deviation, above 1")]
-
-
-class Triangular(_Bounded):
-    """Triangular distribution: its density rises linearly to the mode and falls linearly from there."""
-
-    kind: Literal["triangular"]
-    mode: _Value
+def _vary(table: Mapping[str, Any]) -> Fields:
+    """Return the fields of a ``[[vary]]`` table; one with the key ``same_as`` needs no kind."""
+    kind = table.get(KIND, SAME_AS if SAME_AS in table else "")
+    of_kind = KINDS[kind].fields if isinstance(kind, str) and kind in KINDS else {}
+    return {
+        KIND: Words("", kind != SAME_AS, KINDS, default=SAME_AS if kind == SAME_AS else ""),
+        "path": Words("what is varied: a path as for --set, such as 'supply.pressure'", True),
+        "only": Many(Words("", True), "names of the configurations in which it varies; default: all"),
+        **of_kind,
+    }
 
 
-class Choice(_Varying):
-    """Discrete distribution: values with weights, equal by default."""
-
-    kind: Literal["choice"]
-    values: _Values
-    weights: Annotated[tuple[float, ...], Field(strict=False, description="one weight for each value")] = ()
-
-
-class WholeNumbers(_Varying):
-    """Discrete uniform distribution of integers, bounds included; used for random seeds of sensor noise."""
-
-    kind: Literal["whole_numbers"]
-    minimum: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 0
-    maximum: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = LARGEST_SEED
-
-
-class Stated(_Varying):
-    """Normal distribution from the parameter set's uncertainty; a 95 % half width is 1.96 standard deviations."""
-
-    kind: Literal["stated"]
-
-
-class SameAs(_Varying):
-    """Varied path that takes the value of another varied path in every run."""
-
-    kind: Annotated[Literal["same_as"], Field(description="optional")] = "same_as"
-    same_as: Annotated[Text, Field(description="a path that varies in this study")]
-
-
-class Correlation(StrictTable):
-    """Correlation of two distributions: correlation coefficient of their normal scores (a Gaussian copula)."""
-
-    between: Annotated[tuple[Text, Text], Field(strict=False, description="two paths that have distributions")]
-    coefficient: Annotated[float, Field(ge=-1.0, le=1.0, description="1: both values at the same quantile")]
-
-
-class SamplingSection(StrictTable):
-    """Section of a study file for random draws: method, number and seed; every grid point gets the whole sample."""
-
-    method: Literal["random", "latin_hypercube", "sobol"]
-    runs: Annotated[int, Field(ge=1, le=MAXIMUM_RUNS, description="draws; each is run in every configuration")]
-    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = DEFAULT_SEED
-
-
-class OutputsSection(StrictTable):
-    """Section of a study file for outputs: metrics, traces and quantile bands to keep."""
-
-    metrics: Annotated[Texts | Literal["all"], Field(description="names of metrics, or 'all'")] = ()
-    trajectories: Annotated[Texts, Field(description="channels kept for every run")] = ()
-    bands: Annotated[Texts, Field(description="channels whose quantiles over all runs are kept")] = ()
-    errors: Annotated[
-        bool, Field(description="estimated error of each metric from the steps, in five times the time")
-    ] = False
-    every: Annotated[Text, Field(description="time between two kept samples; default 10 ms")] = "10 ms"
-    quantiles: Annotated[tuple[Annotated[float, Field(ge=0.0, le=1.0)], ...], Field(strict=False, min_length=1)] = (
-        DEFAULT_QUANTILES
-    )
-
-
-Varied = (
-    SameAs
-    | Grid
-    | Listed
-    | Uniform
-    | LogUniform
-    | Normal
-    | TruncatedNormal
-    | LogNormal
-    | Triangular
-    | Choice
-    | WholeNumbers
-    | Stated
-)
-VARIED = get_args(Varied)
-"""Classes of ``Varied``, one for each kind of ``[[vary]]``."""
-NOT_RANDOM = (SameAs, Grid, Listed)
-"""Classes of ``Varied`` that are not distributions."""
-
-
-class StudyFile(StrictTable):
-    """Study file: configurations, varied paths, correlations, sampling and outputs."""
-
-    schema_version: SchemaVersion
-    name: Annotated[str, Field(pattern=NAME, max_length=100)]
-    description: Annotated[str, Field(description="what this study asks, and why")] = ""
-    configurations: Annotated[tuple[ConfigurationSection, ...], Field(strict=False, min_length=1)]
-    vary: Annotated[tuple[Annotated[Varied, Field(discriminator="kind")], ...], Field(strict=False)] = ()
-    correlations: Annotated[tuple[Correlation, ...], Field(strict=False)] = ()
-    runs_of_chunk: Annotated[
-        int | None,
-        Field(
-            ge=1,
-            le=MAXIMUM_RUNS_OF_CHUNK,
-            description="runs computed and written together; default: chosen automatically",
+def declared(_document: Mapping[str, Any]) -> dict[str, Field]:
+    """Return every field of a study file, by path."""
+    texts = Words("", True)
+    configuration: Fields = {
+        "name": Words("label in tables and figures", True, pattern=LABEL),
+        "scenario": Words("name of a scenario, or a path relative to this file", True),
+        "overrides": Many(texts, "such as 'valve.area=12.6mm^2'"),
+    }
+    correlation: Fields = {
+        "between": Many(texts, "two paths that have distributions", True, 2, 2),
+        "coefficient": Quantity("", "", "1: both values at the same quantile", None, -1.0, 1.0, plain=True),
+    }
+    sample: Fields = {
+        "method": Words("how numbers are drawn", True, ("random", "latin_hypercube", "sobol")),
+        "runs": _whole("draws; each is run in every configuration", 1, MAXIMUM_RUNS, optional=False),
+        "seed": _SEED,
+    }
+    outputs: Fields = {
+        "metrics": Many(texts, "names of metrics, or 'all'", words=("all",)),
+        "trajectories": Many(texts, "channels kept for every run"),
+        "bands": Many(texts, "channels whose quantiles over all runs are kept"),
+        "errors": Words("estimated error of each metric from the steps, in five times the time", form=bool),
+        "every": Words("time between two kept samples; default 10 ms"),
+        "quantiles": Many(
+            Quantity("", "", "", None, 0.0, 1.0, plain=True), "of the bands; default 5, 25, 50, 75 and 95 %", least=1
         ),
-    ] = None
-    sample: Annotated[SamplingSection | None, Field(description="for 'sweep': required if there are distributions")] = (
-        None
-    )
-    outputs: Annotated[OutputsSection, Field(description="for 'sweep': what is kept of each run")] = OutputsSection()
+    }
+    return {
+        "schema_version": Words("version of this layout", True, (1,)),
+        "name": Words(required=True, pattern=SHORT_NAME),
+        "description": Words("what this study asks, and why"),
+        "configurations": Many(lambda _: configuration, "each is run with the same draws", True, 1),
+        "vary": Many(_vary, "varied paths"),
+        "correlations": Many(lambda _: correlation, "of the normal scores of two distributions: a Gaussian copula"),
+        "runs_of_chunk": _whole("runs computed and written together", 1, MAXIMUM_RUNS_OF_CHUNK),
+        **inside("sample", sample, "for 'sweep': required if there are distributions"),
+        **inside("outputs", outputs, "for 'sweep': what is kept of each run"),
+    }
 
 
-json_schema = partial(make_schema, StudyFile, "ppafo study")
+json_schema = partial(schema_of, "ppafo study", declared)
 """JSON Schema of a study file."""

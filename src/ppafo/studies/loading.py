@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.arguments import Count, Overrides, Seed, checked
-from ppafo.documents.models import validate
+from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import (
     DataError,
@@ -25,12 +25,13 @@ from ppafo.errors import (
 )
 from ppafo.loading import load_scenario, placed
 from ppafo.metrics import METRICS
+from ppafo.parameters.declared import check_keys
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import other_forms, override_set, read_overrides
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import changes_in, chosen_path
-from ppafo.studies import declaration as declared
+from ppafo.studies.declaration import DEFAULT_SEED, NOT_RANDOM, SAME_AS, declared
 from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, with_noise
 from ppafo.studies.study import (
     NO_SAMPLE,
@@ -156,44 +157,44 @@ def _load(
     tables = document.get("vary")
     for table in tables if isinstance(tables, list | tuple) else ():
         # Files omit the kind of a table with the key `same_as`.
-        if isinstance(table, dict) and "same_as" in table:
-            table.setdefault("kind", "same_as")
-    parsed = validate(declared.StudyFile, document, source.file, StudyError, source.text)
+        if isinstance(table, dict) and SAME_AS in table:
+            table.setdefault("kind", SAME_AS)
+    text = decoded(source.text)
+    check_keys(document, declared(document), source.file, StudyError, text)
     sampling = {key: value for key, value in (("runs", draws), ("seed", seed)) if value is not None}
     with refused_as(StudyError, source.file, StudyError):
         if changes:
-            unchanged = [_configuration(section, source.folder) for section in parsed.configurations]
+            unchanged = [_configuration(section, source.folder) for section in document["configurations"]]
             changed = configurations_with(unchanged, changes)
             for table, configuration in zip(document["configurations"], changed, strict=True):
                 table["overrides"] = list(configuration.scenario.origin.overrides)
-        if sampling and parsed.sample is None:
-            is_random = any(not isinstance(entry, declared.NOT_RANDOM) for entry in parsed.vary)
+        if sampling and "sample" not in document:
+            is_random = any(entry["kind"] not in NOT_RANDOM for entry in document.get("vary", ()))
             raise StudyError(
                 NO_SAMPLE if is_random else "has no [sample], so the runs are not random; omit draws and seed"
             )
-        if sampling:
-            document["sample"] |= sampling
-    parsed = validate(declared.StudyFile, document, source.file, StudyError, source.text)
+    if sampling:
+        document["sample"] |= sampling
+        check_keys(document, declared(document), source.file, StudyError, text)
     with refused_as(StudyError, source.file, StudyError):
-        return _build(parsed, document, source, changes)
+        return _build(document, source, changes)
 
 
-def _build(
-    parsed: declared.StudyFile, document: dict[str, Any], source: _StudySource, changes: tuple[str, ...]
-) -> Study:
-    """Build the study of a parsed study file in SI units; StudyError with all mistakes that stand in the file."""
-    wrong, configurations, paths = list[PpafoError](), list[Configuration](), [entry.path for entry in parsed.vary]
-    for section in parsed.configurations:
+def _build(document: dict[str, Any], source: _StudySource, changes: tuple[str, ...]) -> Study:
+    """Build the study of a checked document in SI units; StudyError with all mistakes that stand in it."""
+    sections, vary, kept = document["configurations"], document.get("vary", ()), document.get("outputs", {})
+    wrong, configurations, paths = list[PpafoError](), list[Configuration](), [entry["path"] for entry in vary]
+    for section in sections:
         with noted_in(wrong):
             configurations.append(_configuration(section, source.folder))
-    if (repeated := first_twice([section.name for section in parsed.configurations])) is not None:
+    if (repeated := first_twice([section["name"] for section in sections])) is not None:
         wrong.append(
             StudyError(f"two configurations are named '{repeated}'; give every configuration a different name")
         )
-    if not paths and len(parsed.configurations) == 1:
+    if not paths and len(sections) == 1:
         wrong.append(StudyError("varies nothing: give at least one [[vary]] or a second configuration"))
     # Rows of channels over time are lists of one length, and bands are quantiles at one time.
-    if "run.duration" in paths and (parsed.outputs.trajectories or parsed.outputs.bands):
+    if "run.duration" in paths and (kept.get("trajectories") or kept.get("bands")):
         said = "'run.duration' cannot vary with trajectories or bands, which need runs of equal length"
         wrong.append(StudyError(said))
     if (repeated := first_twice(paths)) is not None:
@@ -202,28 +203,28 @@ def _build(
     raise_noted(wrong)
     scenarios, outputs = [configuration.scenario for configuration in configurations], None
     varied_paths, independent = dict[str, VariedPath](), list[Axis | RandomValue]()
-    for entry in parsed.vary:
+    for entry in vary:
         with noted_in(wrong):
-            varied_paths[entry.path], values = _varied(entry, configurations, ATMOSPHERE_PATH in paths)
+            varied_paths[entry["path"]], values = _varied(entry, configurations, ATMOSPHERE_PATH in paths)
             independent += [] if values is None else [values]
-        for section, configuration in zip(parsed.configurations, configurations, strict=True):
+        for section, configuration in zip(sections, configurations, strict=True):
             with noted_in(wrong):
                 _check_not_set(entry, section, configuration)
-    followed = {entry.path: entry.same_as for entry in parsed.vary if isinstance(entry, declared.SameAs)}
+    followed = {entry["path"]: entry[SAME_AS] for entry in vary if entry["kind"] == SAME_AS}
     for path, other in followed.items():
         with noted_in(wrong):
             _check_followed(path, other, [each for each in paths if each not in followed], varied_paths)
     drawn, scores, sample = tuple(each for each in independent if isinstance(each, RandomValue)), None, None
-    random = [entry.path for entry in parsed.vary if not isinstance(entry, declared.NOT_RANDOM)]
+    random = [entry["path"] for entry in vary if entry["kind"] not in NOT_RANDOM]
     with noted_in(wrong):
-        scores = _scores(parsed, random)
+        scores = _scores(document.get("correlations", ()), random)
     with noted_in(wrong):
-        outputs = valid_outputs(parsed.outputs, scenarios)
+        outputs = valid_outputs(kept, scenarios)
     # A grid alone is run once, with the noise that its scenarios write.
     if drawn and not wrong:
         drawn, scores = with_noise(drawn, scores, scenarios, paths)
     with noted_in(wrong):
-        sample = _sample(parsed, drawn or random)
+        sample = _sample(document.get("sample"), drawn or random)
     raise_noted(wrong)
     assert outputs is not None and sample is not None, "else refused above"  # noqa: PT018 - both or neither
     # The noise, which has no [[vary]] table, is a plain number.
@@ -232,8 +233,8 @@ def _build(
     # What follows a gauge pressure counts from the atmosphere of its run as well.
     gauge = {path for path, varied in varied_paths.items() if varied.is_gauge}
     return Study(
-        name=parsed.name,
-        description=" ".join(parsed.description.split()),
+        name=document["name"],
+        description=" ".join(document.get("description", "").split()),
         configurations=tuple(configurations),
         axes=tuple(axis for axis in independent if isinstance(axis, Axis)),
         drawn=drawn,
@@ -241,40 +242,41 @@ def _build(
         scores=scores,
         sample=sample,
         outputs=outputs,
-        runs_of_chunk=parsed.runs_of_chunk,
+        runs_of_chunk=document.get("runs_of_chunk"),
         units=plain | {path: varied.quantity.unit or "-" for path, varied in varied_paths.items()},
         given={path: unit for path, unit in given.items() if unit != shown_unit(varied_paths[path].quantity.unit, {})},
         gauge=frozenset(gauge | {path for path, other in followed.items() if other in gauge}),
-        only={entry.path: entry.only for entry in parsed.vary if entry.only},
+        only={entry["path"]: tuple(entry["only"]) for entry in vary if entry.get("only")},
         document=document,
         text=source.text,
         changes=changes_in(*scenarios, overrides=changes),
     )
 
 
-def _configuration(entry: declared.ConfigurationSection, folder: Path) -> Configuration:
+def _configuration(section: Mapping[str, Any], folder: Path) -> Configuration:
     """Load the scenario of a configuration section, with its overrides."""
-    with refused_as(StudyError, f"configuration '{entry.name}'", ScenarioError, ParameterError, DataError):
-        return Configuration(entry.name, load_scenario(placed(entry.scenario, folder), entry.overrides))
+    name = section["name"]
+    with refused_as(StudyError, f"configuration '{name}'", ScenarioError, ParameterError, DataError):
+        return Configuration(name, load_scenario(placed(section["scenario"], folder), section.get("overrides", ())))
 
 
 def _varied(
-    entry: declared.Varied, configurations: Sequence[Configuration], atmosphere_varies: bool
+    entry: Mapping[str, Any], configurations: Sequence[Configuration], atmosphere_varies: bool
 ) -> tuple[VariedPath, Axis | RandomValue | None]:
     """Return a varied path, and its values or distribution in SI; None for one that takes those of another path."""
-    names = [configuration.name for configuration in configurations]
-    with refused_as(StudyError, f"vary '{entry.path}'", ScenarioError, UnitError):
-        for name in entry.only:
+    names, path, only = [each.name for each in configurations], entry["path"], entry.get("only")
+    with refused_as(StudyError, f"vary '{path}'", ScenarioError, UnitError):
+        for name in only or ():
             if name not in names:
                 raise UnitError(f"only: there is no configuration '{name}'{known_names(name, names)}")
-        scenarios = [each.scenario for each in configurations if not entry.only or each.name in entry.only]
-        varied, *others = (varied_path(entry.path, scenario) for scenario in scenarios)
+        scenarios = [each.scenario for each in configurations if not only or each.name in only]
+        varied, *others = (varied_path(path, scenario) for scenario in scenarios)
         if any(other != varied for other in others):
             raise UnitError("differs in unit, limits or atmosphere between configurations; use 'only'")
         varied = given_in(varied, texts_of(entry))
-        if isinstance(entry, declared.SameAs):
+        if entry["kind"] == SAME_AS:
             return varied, None
-        stated = [stated_normal(varied, each) for each in scenarios] if isinstance(entry, declared.Stated) else []
+        stated = [stated_normal(varied, each) for each in scenarios] if entry["kind"] == "stated" else []
         # Where the atmosphere is fixed, gauge is a constant away from absolute; else each run has its own zero.
         if atmosphere_varies:
             varied = in_its_unit(varied, [f"0 {stated[0][1]}"] if stated else texts_of(entry))
@@ -284,23 +286,22 @@ def _varied(
         if len({distribution for distribution, _ in stated}) > 1:
             raise UnitError("the parameter sets of the configurations state different values; use 'only'")
         zero = varied.atmosphere if varied.is_gauge else 0.0
-        return varied, RandomValue(entry.path, replace(stated[0][0], zero=zero))
+        return varied, RandomValue(path, replace(stated[0][0], zero=zero))
 
 
-def _check_not_set(
-    entry: declared.Varied, section: declared.ConfigurationSection, configuration: Configuration
-) -> None:
+def _check_not_set(entry: Mapping[str, Any], section: Mapping[str, Any], configuration: Configuration) -> None:
     """Raise StudyError for a path that is both set and varied in a configuration, in any form (area, conductance)."""
-    overrides, path = read_overrides(section.overrides, StudyError), chosen_path(entry.path, configuration.scenario)
+    overrides = read_overrides(section.get("overrides", ()), StudyError)
+    path, only = chosen_path(entry["path"], configuration.scenario), entry.get("only")
     set_values = override_set(overrides, StudyError, valve=configuration.scenario.device.valve_name)
     # The varied column replaces the value in every run, whichever form of it is set.
     ignored = next((form for form in (path, *other_forms(path)) if form in set_values), None)
     # A stated uncertainty is about the value that is set.
-    is_meant = entry.kind == "stated" and ignored == path
-    if ignored is not None and not is_meant and (not entry.only or section.name in entry.only):
+    is_meant = entry["kind"] == "stated" and ignored == path
+    if ignored is not None and not is_meant and (not only or configuration.name in only):
         raise StudyError(
-            f"configuration '{section.name}': '{set_values[ignored]}' is set and '{entry.path}' is varied: omit "
-            "one of them, or restrict the [[vary]] to other configurations with 'only'"
+            f"configuration '{configuration.name}': '{set_values[ignored]}' is set and '{entry['path']}' is varied: "
+            "omit one of them, or restrict the [[vary]] to other configurations with 'only'"
         )
 
 
@@ -316,21 +317,21 @@ def _check_followed(path: str, other: str, independent: Sequence[str], varied: M
         raise StudyError(f"{said} has the unit '{units[1]}', but '{path}' has '{units[0]}'; both need the same unit")
 
 
-def _scores(parsed: declared.StudyFile, paths: Sequence[str]) -> Factor | None:
+def _scores(correlations: Sequence[Mapping[str, Any]], paths: Sequence[str]) -> Factor | None:
     """Return the lower Cholesky factor of the correlation of the normal scores; None without correlations."""
-    if not parsed.correlations:
+    if not correlations:
         return None
     coefficients: dict[tuple[str, str], float] = {}
-    for pair in parsed.correlations:
-        first, other = pair.between
-        for path in pair.between:
+    for pair in correlations:
+        first, other = pair["between"]
+        for path in pair["between"]:
             if path not in paths:
                 raise StudyError(f"correlations: '{path}' has no distribution{known_names(path, paths)}")
         if first == other or (first, other) in coefficients or (other, first) in coefficients:
             raise StudyError(
                 f"correlations: between = ['{first}', '{other}'] must name two different paths, and each pair only once"
             )
-        coefficients[first, other] = min(max(pair.coefficient, -_CLOSEST), _CLOSEST)
+        coefficients[first, other] = min(max(pair["coefficient"], -_CLOSEST), _CLOSEST)
     matrix = np.eye(len(paths))
     for (first, other), coefficient in coefficients.items():
         row, column = paths.index(first), paths.index(other)
@@ -344,16 +345,16 @@ def _scores(parsed: declared.StudyFile, paths: Sequence[str]) -> Factor | None:
     return factor
 
 
-def _sample(parsed: declared.StudyFile, drawn: Sequence[object]) -> SamplingPlan:
+def _sample(section: Mapping[str, Any] | None, drawn: Sequence[object]) -> SamplingPlan:
     """Return the sampling plan of the distributions; without distributions, one run at each point of the grid."""
     if not drawn:
-        if parsed.sample is not None:
+        if section is not None:
             raise StudyError("[sample] is given, but no value has a distribution; omit [sample]")
         return SamplingPlan(None, 1, 0)
     # Enough where something else draws, such as a sensitivity analysis.
-    if parsed.sample is None:
-        return SamplingPlan(None, 1, declared.DEFAULT_SEED)
+    if section is None:
+        return SamplingPlan(None, 1, DEFAULT_SEED)
     # The direction numbers of SciPy's sequence end there.
-    if parsed.sample.method == "sobol" and len(drawn) > MAXIMUM_SOBOL_DIMENSIONS:
+    if section["method"] == "sobol" and len(drawn) > MAXIMUM_SOBOL_DIMENSIONS:
         raise StudyError(f"sample.method = 'sobol' allows at most {MAXIMUM_SOBOL_DIMENSIONS} distributions")
-    return SamplingPlan(parsed.sample.method, parsed.sample.runs, parsed.sample.seed)
+    return SamplingPlan(section["method"], section["runs"], section.get("seed", DEFAULT_SEED))

@@ -17,10 +17,12 @@ from ppafo.parameters.parameter_set import PATHS_THAT_SET_UNITS, chosen_units
 from ppafo.simulation.ensemble.running import lacking, offered
 from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.scenario import Scenario
-from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import Distribution
 from ppafo.units import parse_quantity
 from ppafo.wording import first_twice, known_names
+
+_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+"""Default quantiles: the central 90 % of the runs, the central 50 %, and the median."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,14 +47,16 @@ class Outputs:
         return tuple(dict.fromkeys((*self.trajectories, *self.bands)))
 
 
-def valid_outputs(outputs: declared.OutputsSection, scenarios: Sequence[Scenario]) -> Outputs:
-    """Check the outputs of a study and convert them to SI; StudyError for an unknown metric or channel."""
-    metrics = tuple(METRICS) if outputs.metrics == "all" else tuple(outputs.metrics)
+def valid_outputs(section: Mapping[str, Any], scenarios: Sequence[Scenario]) -> Outputs:
+    """Check the section of outputs of a study, and convert it to SI; StudyError for an unknown metric or channel."""
+    asked, trajectories, bands = (tuple(section.get(key, ())) for key in ("metrics", "trajectories", "bands"))
+    has_all, typed = section.get("metrics") == "all", section.get("every", "10 ms")
+    metrics = tuple(METRICS) if has_all else asked
     apply = dict.fromkeys(name for scenario in scenarios for name in offered(scenario))
     requests = (
         ("metrics", "metric", metrics, METRICS, apply),
-        ("trajectories", "channel", outputs.trajectories, TRACED, TRACED),
-        ("bands", "channel", outputs.bands, TRACED, TRACED),
+        ("trajectories", "channel", trajectories, TRACED, TRACED),
+        ("bands", "channel", bands, TRACED, TRACED),
     )
     for key, noun, names, known, shown in requests:
         for name in names:
@@ -60,7 +64,7 @@ def valid_outputs(outputs: declared.OutputsSection, scenarios: Sequence[Scenario
                 raise StudyError(f"outputs.{key}: there is no {noun} '{name}'{known_names(name, shown or known)}")
         if (repeated := first_twice(names)) is not None:
             raise StudyError(f"outputs.{key}: '{repeated}' is named twice; name it once")
-    channels = (*outputs.trajectories, *outputs.bands)
+    channels = (*trajectories, *bands)
     controlled = {each.controlled for each in scenarios if not each.controller.is_open_loop}
     for name, kind in CONTROLLED.items():
         if kind.reference in channels and name not in controlled:
@@ -70,23 +74,21 @@ def valid_outputs(outputs: declared.OutputsSection, scenarios: Sequence[Scenario
     # A metric that one configuration has is kept, empty for the others; 'all' takes those that any has.
     has = {name: [lacking(scenario, METRICS[name]) for scenario in scenarios] for name in metrics}
     missing = {name: reasons[0] for name, reasons in has.items() if all(reasons)}
-    if missing and outputs.metrics != "all":
+    if missing and not has_all:
         name, reason = next(iter(missing.items()))
         raise StudyError(f"outputs: no scenario has '{name}': {reason}")
-    with refused_as(StudyError, f"outputs.every = {outputs.every!r}", UnitError):
-        every = parse_quantity(outputs.every, "s")
+    with refused_as(StudyError, f"outputs.every = {typed!r}", UnitError):
+        every = parse_quantity(typed, "s")
     shortest = min(scenario.run.duration for scenario in scenarios)
     if channels and not 0.0 < every <= shortest:
-        raise StudyError(
-            f"outputs.every = {outputs.every!r} must be above 0 s and at most run.duration = {shortest:g} s"
-        )
+        raise StudyError(f"outputs.every = {typed!r} must be above 0 s and at most run.duration = {shortest:g} s")
     return Outputs(
         metrics=tuple(name for name in metrics if name not in missing),
-        trajectories=outputs.trajectories,
-        bands=outputs.bands,
+        trajectories=trajectories,
+        bands=bands,
         every=every,
-        quantiles=tuple(sorted(set(outputs.quantiles))),
-        errors=outputs.errors,
+        quantiles=tuple(sorted(set(map(float, section.get("quantiles", _QUANTILES))))),
+        errors=section.get("errors", False),
     )
 
 

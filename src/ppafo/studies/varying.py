@@ -1,7 +1,7 @@
 """Varied values of a study: paths with units and limits; conversion of ``[[vary]]`` tables to SI."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,8 +16,8 @@ from ppafo.parameters.graph import counts_from, gauge_link
 from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si, in_first_unit, unit_in
 from ppafo.simulation.hardware import parameter_set_of
 from ppafo.simulation.numbers import NOISE_SEED, declared_numbers, number_at
-from ppafo.simulation.scenario import Scenario
-from ppafo.studies import declaration as declared
+from ppafo.simulation.scenario import LARGEST_SEED, Scenario
+from ppafo.studies.declaration import KINDS
 from ppafo.studies.distributions import Distribution
 from ppafo.studies.study import Axis, RandomValue
 from ppafo.units import parse_quantity, split_pressure_kind, split_quantity
@@ -135,35 +135,32 @@ def in_its_unit(varied: VariedPath, texts: Iterable[object]) -> VariedPath:
     return replace(varied, is_gauge=True)
 
 
-def texts_of(entry: declared.Varied) -> list[object]:
+def texts_of(entry: Mapping[str, Any]) -> list[object]:
     """Return the values of a ``[[vary]]`` table in the order of its keys, except differences and fractions."""
     keys = ("first", "last", "minimum", "maximum", "mean", "median", "mode")
-    return [*(getattr(entry, key) for key in keys if hasattr(entry, key)), *getattr(entry, "values", ())]
+    return [*(entry[key] for key in keys if key in entry), *entry.get("values", ())]
 
 
-def axis_or_distribution(entry: declared.Varied, varied: VariedPath) -> Axis | RandomValue:
+def axis_or_distribution(entry: Mapping[str, Any], varied: VariedPath) -> Axis | RandomValue:
     """Convert a ``[[vary]]`` table to an axis or distribution; UnitError with the key of an unusable value."""
-    is_counted, is_whole = entry.path == NOISE_SEED, entry.kind == "whole_numbers"
-    if is_whole and not is_counted:
+    path, kind = varied.path, entry["kind"]
+    if kind == "whole_numbers" and path != NOISE_SEED:
         raise UnitError(f"kind = 'whole_numbers' is only for {NOISE_SEED}; use 'choice' or 'uniform'")
-    if is_counted and entry.kind not in ("grid", "list", "choice", "whole_numbers"):
-        raise UnitError(
-            f"kind = '{entry.kind}' does not give whole numbers, which '{entry.path}' needs; use 'whole_numbers'"
-        )
-    if isinstance(entry, declared.Listed):
-        levels = tuple(_level("values", value, varied) for value in entry.values)
-        return Axis(entry.path, _all_whole(entry.path, levels))
-    if not isinstance(entry, declared.Grid):
-        is_choice = isinstance(entry, declared.Choice)
-        return RandomValue(entry.path, _choice(entry, varied) if is_choice else _distribution(entry, varied))
-    first, last = (_level(key, getattr(entry, key), varied) for key in ("first", "last"))
+    if path == NOISE_SEED and kind not in ("grid", "list", "choice", "whole_numbers"):
+        raise UnitError(f"kind = '{kind}' does not give whole numbers, which '{path}' needs; use 'whole_numbers'")
+    if kind in ("list", "choice"):
+        values = _all_whole(path, tuple(_level("values", value, varied) for value in entry["values"]))
+        return Axis(path, values) if kind == "list" else RandomValue(path, _choice(values, entry.get("weights", ())))
+    if kind != "grid":
+        return RandomValue(path, _distribution({"minimum": 0, "maximum": LARGEST_SEED, **entry}, varied))
+    first, last = (_level(key, entry[key], varied) for key in ("first", "last"))
     if first == last:
-        raise UnitError(f"first and last are both {entry.first!r}; they must differ")
-    is_logarithmic = entry.spacing == "logarithmic"
+        raise UnitError(f"first and last are both {entry['first']!r}; they must differ")
+    is_logarithmic = entry.get("spacing") == "logarithmic"
     if is_logarithmic and min(first, last) <= 0.0:
         raise UnitError("spacing = 'logarithmic' needs first and last above 0")
     spaced = np.geomspace if is_logarithmic else np.linspace
-    return Axis(entry.path, _all_whole(entry.path, tuple(spaced(first, last, entry.count).tolist())))
+    return Axis(path, _all_whole(path, tuple(spaced(first, last, entry["count"]).tolist())))
 
 
 def _all_whole(path: str, values: tuple[float, ...]) -> tuple[float, ...]:
@@ -173,14 +170,15 @@ def _all_whole(path: str, values: tuple[float, ...]) -> tuple[float, ...]:
     return values
 
 
-def _distribution(entry: Any, varied: VariedPath) -> Distribution:
+def _distribution(entry: Mapping[str, Any], varied: VariedPath) -> Distribution:
     """Return the distribution of a ``[[vary]]`` table; UnitError for numbers that do not make one."""
-    is_logarithmic = entry.kind in ("log_uniform", "log_normal")
+    kind = entry["kind"]
+    is_logarithmic = kind in ("log_uniform", "log_normal")
     # Of the absolute pressure: a gauge pressure may be 0 or below, where there is no logarithm.
     place = replace(varied, is_gauge=False) if is_logarithmic else varied
-    keys = [key for key in ("mean", "median", "minimum", "mode", "maximum") if hasattr(entry, key)]
-    levels = {key: _level(key, getattr(entry, key), place) for key in keys}
-    said = {key: f"{key} = {getattr(entry, key)!r}" for key in keys}
+    keys = [key for key in ("mean", "median", "minimum", "mode", "maximum") if key in KINDS[kind].fields]
+    levels = {key: _level(key, entry[key], place) for key in keys}
+    said = {key: f"{key} = {entry[key]!r}" for key in (*keys, "standard_deviation") if key in entry}
     if "minimum" in levels and levels["minimum"] >= levels["maximum"]:
         raise UnitError(f"{said['minimum']} must be less than {said['maximum']}")
     if "mode" in levels and not levels["minimum"] <= levels["mode"] <= levels["maximum"]:
@@ -189,33 +187,26 @@ def _distribution(entry: Any, varied: VariedPath) -> Distribution:
         raise UnitError(f"{said[keys[0]]} must be above 0")
     numbers = list(levels.values())
     if "mean" in levels:
-        numbers.insert(1, _deviation(entry, varied))
-    if entry.kind == "log_normal":
-        numbers.append(entry.factor)
-    return Distribution(entry.kind, tuple(numbers), varied.atmosphere if is_logarithmic and varied.is_gauge else 0.0)
+        with refused_as(UnitError, said["standard_deviation"], UnitError):
+            numbers.insert(1, varied.distance(entry["standard_deviation"]))
+        if numbers[1] <= 0.0:
+            raise UnitError(f"{said['standard_deviation']} must be above 0")
+    if kind == "log_normal":
+        numbers.append(entry["factor"])
+    return Distribution(kind, tuple(numbers), varied.atmosphere if is_logarithmic and varied.is_gauge else 0.0)
 
 
-def _deviation(entry: declared.Normal | declared.TruncatedNormal, varied: VariedPath) -> float:
-    said = f"standard_deviation = {entry.standard_deviation!r}"
-    with refused_as(UnitError, said, UnitError):
-        deviation = varied.distance(entry.standard_deviation)
-    if deviation <= 0.0:
-        raise UnitError(f"{said} must be above 0")
-    return deviation
-
-
-def _choice(entry: Any, varied: VariedPath) -> Distribution:
+def _choice(values: tuple[float, ...], given: Sequence[float]) -> Distribution:
     """Return a discrete distribution; UnitError if the number of weights does not fit the values."""
-    values = _all_whole(entry.path, tuple(_level("values", value, varied) for value in entry.values))
-    weights = entry.weights or (1.0,) * len(values)
+    weights = [float(weight) for weight in given or (1.0,) * len(values)]
     if len(weights) != len(values):
         raise UnitError(
             f"weights has {len(weights)} numbers, values has {len(values)}; there must be one weight for each value"
         )
     if min(weights) < 0.0 or math.fsum(weights) <= 0.0:
-        raise UnitError(f"weights = {list(weights)} must be at least 0, and not all of them 0")
+        raise UnitError(f"weights = {weights} must be at least 0, and not all of them 0")
     fractions = np.cumsum(weights) / np.sum(weights)
-    return Distribution(entry.kind, (values, tuple(fractions.tolist())))
+    return Distribution("choice", (values, tuple(fractions.tolist())))
 
 
 def _level(key: str, value: str | float, varied: VariedPath) -> float:

@@ -136,7 +136,7 @@ def test_correlations_that_cannot_hold_at_once_are_refused(varying: Callable[...
     [
         (["valve.area", "valve.aera"], 0.5, "did you mean 'valve.area'?"),
         (["valve.area", "valve.area"], 0.5, "must name two different paths"),
-        (["valve.area", "actuator.leak.area"], 1.1, "less than or equal to 1"),
+        (["valve.area", "actuator.leak.area"], 1.1, "at least -1 and at most 1"),
         (["valve.area", "reference.level"], 0.5, "'reference.level' has no distribution"),
     ],
 )
