@@ -20,7 +20,7 @@ def start() -> int:
         interrupts.listen_no_more()
         return 130 if interrupts.is_interrupted() else code
     except (KeyboardInterrupt, Exception) as error:
-        # Python wraps an interrupt that falls into the making of a class, pydantic makes another error of it.
+        # Python wraps an interrupt that falls into the making of a class in another error.
         if not (isinstance(error, KeyboardInterrupt) or interrupts.is_interrupted()):
             raise
         sys.stderr.write("ppafo: interrupted; no file is incomplete\n")

@@ -9,6 +9,7 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.gait.recorded.mapping import GaitMap
+from ppafo.parameters.records import record_from
 
 PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "walk.md").read_text(encoding="utf-8")
 
@@ -17,7 +18,7 @@ def test_the_gait_map_of_the_page_is_read() -> None:
     (text,) = [
         block for block in re.findall(r"^```toml\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE) if "terms" in block
     ]
-    given = GaitMap.model_validate(tomllib.loads(text))
+    given = record_from(GaitMap, tomllib.loads(text))
     assert given.shank_angle.terms is not None
     assert given.knee is not None
     assert given.knee.thigh_length == "0.42 m"

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-HEAVY = ("matplotlib", "xarray", "pandas", "scipy", "numpy", "pydantic", "jinja2", "h5netcdf")
+HEAVY = ("matplotlib", "xarray", "pandas", "scipy", "numpy", "jinja2", "h5netcdf")
 PACKAGE = "import ppafo"
 HELP = "from ppafo.cli.main import main\ntry:\n    main(['--help'])\nexcept SystemExit:\n    pass"
 HELP_OF_A_COMMAND = HELP.replace("'--help'", "'simulate', '--help'")

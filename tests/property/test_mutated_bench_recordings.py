@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from ppafo.errors import PpafoError
 from ppafo.identification.bench.flow import GasAt
 from ppafo.identification.source import RecordingSource
+from ppafo.parameters.records import record_from
 from ppafo.storage import read_csv
 from ppafo.storage.column_map import ColumnMap
 from ppafo.storage.foreign import read_foreign
@@ -77,7 +78,7 @@ def read(path: Path, kind: str, through_map: bool) -> RecordingSource:
     if not through_map:
         return RecordingSource(read_csv(path))
     channels = {name: {"column": number, "unit": unit} for number, (name, unit) in enumerate(UNITS[kind].items(), 1)}
-    return RecordingSource(read_foreign(path, ColumnMap.model_validate({"channels": channels})))
+    return RecordingSource(read_foreign(path, record_from(ColumnMap, {"channels": channels})))
 
 
 @pytest.mark.parametrize("kind", RUNS)

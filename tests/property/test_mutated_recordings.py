@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from ppafo.errors import PpafoError
 from ppafo.parameters import load_device
+from ppafo.parameters.records import record_from
 from ppafo.storage.column_map import ColumnMap
 from ppafo.validation.agreement import compare_recording
 from ppafo.validation.measured import read_measured
@@ -19,8 +20,9 @@ HEADER = "time [s],command [-],supply_pressure [psi_g],angle [deg],pressure_1 [p
 ROWS = [f"{0.001 * n:.3f},{0 if n < 5 else 1},{50.1},{60 + n},{min(n, 45)},{45 - min(n, 45)}" for n in range(50)]
 TEXT = "\n".join([HEADER, *ROWS, ""])
 UNITS = dict(cell.removesuffix("]").split(" [") for cell in HEADER.split(","))
-MAP = ColumnMap.model_validate(
-    {"channels": {name: {"column": number, "unit": unit} for number, (name, unit) in enumerate(UNITS.items(), 1)}}
+MAP = record_from(
+    ColumnMap,
+    {"channels": {name: {"column": number, "unit": unit} for number, (name, unit) in enumerate(UNITS.items(), 1)}},
 )
 CELLS = st.sampled_from(["", "nan", "inf", "-1", "1e300", "-1e-300", "0", "130", "1e9", "x", '"', "\0", "½", ",", "\n"])
 

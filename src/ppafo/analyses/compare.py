@@ -231,9 +231,8 @@ def compare(
     from ppafo.simulation.ensemble.running import lacking
     from ppafo.simulation.numbers import NOISE_SEED
     from ppafo.simulation.simulate import simulate_many
-    from ppafo.studies.declaration import DEFAULT_SEED
     from ppafo.studies.draws import FEWEST_DRAWS, MAXIMUM_DRAWS, Uncertainty, study_of, uncertainty_of
-    from ppafo.studies.study import changes_of, choose_configurations, configurations_with
+    from ppafo.studies.study import DEFAULT_SEED, changes_of, choose_configurations, configurations_with
 
     count = DEFAULT_DRAWS if draws is None else draws
     if not FEWEST_DRAWS <= count <= MAXIMUM_DRAWS:

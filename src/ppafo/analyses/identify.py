@@ -239,7 +239,7 @@ class _RecordingReader(NamedTuple):
         # A direction from a rate, and trials that begin anew, need the times of the bench.
         if row_time is not None and not (TIME in column_map.channels or column_map.direction or column_map.trial):
             time = MappedChannel(rate=f"{1.0 / row_time!r} Hz")
-            column_map = column_map.model_copy(update={"channels": {TIME: time, **column_map.channels}})
+            column_map = replace(column_map, channels={TIME: time, **column_map.channels})
         recordings = read_trials(path, column_map, atmosphere, f"{self.file}:{columns}", flowing)
         return tuple(source_of(path, recording, recording.label.removeprefix(path.stem)) for recording in recordings)
 
@@ -363,7 +363,6 @@ def _described_set(identification: Identification, problem: ProblemFile) -> Para
     """
     from ppafo.parameters.audit import findings_of
     from ppafo.parameters.loading import list_sets
-    from ppafo.parameters.parameter_set import Citation
 
     old, new = identification.new_set.parameter_set, identification.new_set
     named = [name for procedure in problem.procedure for name in procedure.recordings]
@@ -398,7 +397,7 @@ def _described_set(identification: Identification, problem: ProblemFile) -> Para
         file=f"{problem.name}.toml",
         name=problem.name,
         title=problem.title or f"{old.title}, {outcome} on {old.name} from {shown}",
-        citation=old.citation if (cited := problem.citation) is None else Citation(**cited.model_dump()),
+        citation=old.citation if problem.citation is None else problem.citation,
         # The new set may go anywhere, where the path of a file would not lead to its parent.
         parent=problem.device.set if problem.device.set in list_sets() else "",
         notes=f"{old.notes.rstrip()}\n{origins}".lstrip(),

@@ -30,10 +30,9 @@ from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION, font_size
 from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.numbers import NOISE_SEED
 from ppafo.storage.parquet import TableColumn, as_numpy, encode_texts, matrix_of, parquet_bytes, table_of
-from ppafo.studies.declaration import DEFAULT_SEED
 from ppafo.studies.distributions import Floats
 from ppafo.studies.loading import list_studies, load_study
-from ppafo.studies.study import Study
+from ppafo.studies.study import DEFAULT_SEED, Study
 from ppafo.study.blocks import MAXIMUM_RUNS_OF_CHUNK, samples_of
 from ppafo.study.runs import joined
 from ppafo.study.store import (

@@ -15,18 +15,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field
 
 from ppafo.arguments import Overrides, checked
-from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema, validate
-from ppafo.documents.toml_text import NAME, TomlKind, beside
+from ppafo.documents.toml_text import TomlKind, beside
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, refused_as
 from ppafo.linear_algebra import on_one_thread
 from ppafo.loading import load_scenario, placed, reloaded, usage_text
 from ppafo.metrics import Metric
 from ppafo.metrics.metric import controlled_in
 from ppafo.model.controlled import CONTROLLED, TORQUE
+from ppafo.model.declaration import Number
+from ppafo.parameters.declared import SHORT_NAME, Words
 from ppafo.parameters.overrides import over
+from ppafo.parameters.records import SchemaVersion, checked_record, keyed, record_schema
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report, report_nothing
 from ppafo.report.finding import Column, Finding, Section, columns_of
@@ -88,20 +89,23 @@ _SEARCH_CAPTION = (
     "before that is beyond a bound is drawn beside it."
 )
 Gains = Mapping[str, float]
-_Value = Annotated[str | float | int, Field(description="text with unit; a plain number if there is no unit")]
-_Metric = Annotated[Text, Field(description="name of a metric, such as 'rms_error'")]
+_Value = Annotated[str | float, Words("text with unit; a plain number if there is no unit", form=float)]
+_Metric = Annotated[str, Words("name of a metric, such as 'rms_error'")]
+_Count = partial(Number, "", whole=True)
 
 
-class SearchRange(StrictTable):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SearchRange:
     """Section of a tuning file for a searched parameter: path, bounds with units, linear or logarithmic spacing."""
 
-    path: Annotated[Text, Field(description="as for --set, such as 'controller.proportional_gain'")]
+    path: str = keyed("as for --set, such as 'controller.proportional_gain'")
     minimum: _Value
     maximum: _Value
-    spacing: Annotated[Literal["linear", "logarithmic"], Field(description="default: linear")] = "linear"
+    spacing: Literal["linear", "logarithmic"] = keyed("default: linear", "linear")
 
 
-class GoalSection(StrictTable):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GoalSection:
     """Section of a tuning file for a term of the minimised objective: weight times metric divided by scale.
 
     A metric with a negative weight is maximised.
@@ -109,33 +113,33 @@ class GoalSection(StrictTable):
 
     metric: _Metric
     weight: float = 1.0
-    scale: Annotated[Text | None, Field(description="value that is scaled to 1; default: the value before tuning")] = (
-        None
-    )
+    scale: str | None = keyed("value that is scaled to 1; default: the value before tuning", None)
 
 
-class Constraint(StrictTable):
+@dataclass(frozen=True, slots=True)
+class Constraint:
     """Section of a tuning file for a constraint: upper or lower limit of a metric."""
 
     metric: _Metric
-    at_most: Annotated[Text | None, Field(description="largest value with its unit")] = None
-    at_least: Annotated[Text | None, Field(description="smallest value with its unit")] = None
+    at_most: str | None = keyed("largest value with its unit", None)
+    at_least: str | None = keyed("smallest value with its unit", None)
 
 
-class Robust(StrictTable):
+@dataclass(frozen=True, slots=True)
+class Robust:
     """Section of a tuning file for robustness: candidates run over the same draws; the unfavourable end counts."""
 
-    study: Annotated[Text, Field(description="name of a study, or a path relative to this file")]
-    measure: Annotated[
-        Literal["mean_and_deviations", "quantile"],
-        Field(description="mean plus 'deviations' standard deviations, or the 'share' quantile"),
-    ] = "mean_and_deviations"
-    deviations: Annotated[float, Field(ge=0.0, le=10.0)] = 1.0
-    share: Annotated[float, Field(ge=0.5, lt=1.0)] = 0.9
-    draws: Annotated[int, Field(ge=8, le=MAXIMUM_DRAWS)] = 64
+    study: str = keyed("name of a study, or a path relative to this file")
+    measure: Literal["mean_and_deviations", "quantile"] = keyed(
+        "mean plus 'deviations' standard deviations, or the 'share' quantile", "mean_and_deviations"
+    )
+    deviations: float = keyed(Number("", "", None, 0.0, 10.0, plain=True), 1.0)
+    share: float = keyed(Number("", "", None, 0.5, math.nextafter(1.0, 0.0), plain=True), 0.9)
+    draws: int = keyed(_Count("", None, 8, MAXIMUM_DRAWS), 64)
 
 
-class SearchEffort(StrictTable):
+@dataclass(frozen=True, slots=True)
+class SearchEffort:
     """Section of a tuning file for the effort of the search.
 
     ``starts``: number of independent starts
@@ -144,30 +148,29 @@ class SearchEffort(StrictTable):
     ``seed``: random seed
     """
 
-    starts: Annotated[int, Field(ge=1, le=100)] = 3
-    generations: Annotated[int, Field(ge=1, le=100_000)] = 100
-    candidates_per_gain: Annotated[int, Field(ge=4, le=1000)] = 10
-    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 1
+    starts: int = keyed(_Count("", None, 1, 100), 3)
+    generations: int = keyed(_Count("", None, 1, 100_000), 100)
+    candidates_per_gain: int = keyed(_Count("", None, 4, 1000), 10)
+    seed: int = keyed(_Count("", None, 0, LARGEST_SEED), 1)
 
 
-class TuningFile(StrictTable):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TuningFile:
     """Tuning file: scenario, searched parameters, objective, constraints, robustness and effort."""
 
     schema_version: SchemaVersion
-    name: Annotated[str, Field(pattern=NAME, max_length=100)]
+    name: str = keyed(Words(pattern=SHORT_NAME))
     description: str = ""
-    scenario: Annotated[Text, Field(description="name of a scenario, or a path relative to this file")]
-    overrides: Annotated[Texts, Field(description="such as 'valve.area=12.6mm^2'")] = ()
-    search: Annotated[tuple[SearchRange, ...], Field(strict=False, min_length=1)]
-    objective: Annotated[tuple[GoalSection, ...], Field(strict=False, min_length=1)]
-    constraints: Annotated[tuple[Constraint, ...], Field(strict=False)] = ()
-    robust: Annotated[
-        Robust | None, Field(description="uncertainty to be robust against; default: the nominal device")
-    ] = None
+    scenario: str = keyed("name of a scenario, or a path relative to this file")
+    overrides: tuple[str, ...] = keyed("such as 'valve.area=12.6mm^2'", ())
+    search: tuple[SearchRange, ...]
+    objective: tuple[GoalSection, ...]
+    constraints: tuple[Constraint, ...] = ()
+    robust: Robust | None = keyed("uncertainty to be robust against; default: the nominal device", None)
     effort: SearchEffort = SearchEffort()
 
 
-json_schema = partial(make_schema, TuningFile, "ppafo tuning")
+json_schema = partial(record_schema, TuningFile, "ppafo tuning")
 """JSON Schema of a tuning file."""
 TUNING = TomlKind("tuning", "tuning", resources.files("ppafo") / "analyses" / "tunings", StudyError)
 
@@ -406,7 +409,7 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
     """
     name_plugins(plugins)
     document, source = read_source(TUNING, tuning)
-    parsed = validate(TuningFile, document, source.file, StudyError, source.text)
+    parsed = checked_record(TuningFile, document, source.file, StudyError, source.text)
     with refused_as(StudyError, source.file, ScenarioError, ParameterError, StudyError):
         scenario = load_scenario(placed(parsed.scenario, source.folder), parsed.overrides)
         scenario = reloaded(scenario, overrides) if overrides else scenario

@@ -1,27 +1,28 @@
 """Problem file of ``ppafo identify``: initial parameter set, recordings, column maps, and procedures to apply."""
 
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field
-
 from ppafo.documents.faults import line_of, refuse
-from ppafo.documents.models import Quantified, SchemaVersion, StrictTable, Text, Texts, make_schema, validate
 from ppafo.documents.regular_file import decoded
-from ppafo.documents.toml_text import NAME, TomlKind, label, quote
+from ppafo.documents.toml_text import TomlKind, label, quote
 from ppafo.errors import IdentificationError
 from ppafo.identification.procedures import BenchProblem
 from ppafo.identification.tolerances import Columns, Confidence, Tolerances
 from ppafo.identification.trajectory.experiment import ALL_INPUTS
+from ppafo.model.declaration import Number
+from ppafo.parameters.declared import SHORT_NAME, Words
+from ppafo.parameters.parameter_set import Citation
+from ppafo.parameters.records import SchemaVersion, checked_record, keyed, record_schema
 from ppafo.simulation.recorded.channels import LONGEST_STEP
 from ppafo.storage.column_map import ColumnMap
 from ppafo.wording import known_names, nearest_name
 
-_Label = Annotated[
-    str, Field(pattern=NAME, max_length=60, description="name of the experiment, also used in file names")
-]
+_Label = Annotated[str, Words("name of the experiment, also used in file names", pattern=SHORT_NAME)]
 SHORTEST_STEP = 1.0e-6
 """Shortest time step that a problem file may request [s]."""
 _FILE = TomlKind(
@@ -29,37 +30,48 @@ _FILE = TomlKind(
 )
 
 
-class NoiseSection(StrictTable):
+_PASCALS = Number("Pa_d", "", minimum=0.0, minimum_allowed=False)
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseSection:
     """Standard deviations of the noise by channel."""
 
-    angle: Annotated[float, Quantified("rad", above=0.0)] | None = None
-    pressure_1: Annotated[float, Quantified("Pa_d", above=0.0)] | None = None
-    pressure_2: Annotated[float, Quantified("Pa_d", above=0.0)] | None = None
+    angle: float | None = keyed(Number("rad", "", minimum=0.0, minimum_allowed=False), None)
+    pressure_1: float | None = keyed(_PASCALS, None)
+    pressure_2: float | None = keyed(_PASCALS, None)
+
+    def by_channel(self) -> dict[str, float]:
+        """Return the standard deviations that are stated, by channel [SI]."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
 
 
-class PriorSection(StrictTable):
+@dataclass(frozen=True, slots=True)
+class PriorSection:
     """Prior of a parameter: a normal distribution."""
 
-    mean: Annotated[Text, Field(description="most likely value, with its unit")]
-    relative: Annotated[float, Field(gt=0.0, description="standard deviation over the mean")]
+    mean: str = keyed("most likely value, with its unit")
+    relative: float = keyed(
+        Number("", "standard deviation over the mean", minimum=0.0, minimum_allowed=False, plain=True)
+    )
 
 
-class ParameterSection(StrictTable):
+@dataclass(frozen=True, slots=True)
+class ParameterSection:
     """Table [[trajectory.parameters]]: parameter to fit, with start, bounds and prior."""
 
-    path: Text = Field(description="dotted path, such as friction.viscous_damping or initial.pressure_1")
-    start: Text | None = Field(
-        None, description="start of the search; default: from the bench procedures, else the set"
+    path: str = keyed("dotted path, such as friction.viscous_damping or initial.pressure_1")
+    start: str | None = keyed("start of the search; default: from the bench procedures, else the set", None)
+    low: str | None = keyed("lower bound", None)
+    high: str | None = keyed("upper bound", None)
+    prior: PriorSection | Literal["bench"] | None = keyed(
+        "what is known beforehand; 'bench': the interval of a bench procedure of this file", None
     )
-    low: Text | None = Field(None, description="lower bound")
-    high: Text | None = Field(None, description="upper bound")
-    prior: PriorSection | Literal["bench"] | None = Field(
-        None, description="what is known beforehand; 'bench': the interval of a bench procedure of this file"
-    )
-    recordings: Texts = Field((), description="experiments in which it acts, by label; default: all")
+    recordings: tuple[str, ...] = keyed("experiments in which it acts, by label; default: all", ())
 
 
-class ExperimentSection(StrictTable):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExperimentSection:
     """Table [[trajectory.experiments]]: recording with the scenario that models it.
 
     The scenario is run with the device of the problem. Without a scenario, the recorded command, supply and external
@@ -67,99 +79,86 @@ class ExperimentSection(StrictTable):
     """
 
     label: _Label
-    recording: Text = Field(description="file, relative to this one")
+    recording: str = keyed("file, relative to this one")
     columns: Columns = None
-    scenario: Text | None = Field(None, description="name or relative file of a scenario; default: the recorded inputs")
-    overrides: Texts = Field((), description="changes to the scenario, or to the device without one")
-    start: Annotated[float, Quantified("s")] | None = Field(
-        None, description="time of the recording at which the run begins; 0 s, or the first sample"
+    scenario: str | None = keyed("name or relative file of a scenario; default: the recorded inputs", None)
+    overrides: tuple[str, ...] = keyed("changes to the scenario, or to the device without one", ())
+    start: float | None = keyed(
+        Number("s", "time of the recording at which the run begins; 0 s, or the first sample"), None
     )
-    step: Annotated[float, Quantified("s", SHORTEST_STEP, LONGEST_STEP)] | None = Field(
-        None, description="longest step of time in the run, such as '0.1 ms'"
+    step: float | None = keyed(
+        Number("s", "longest step of time in the run, such as '0.1 ms'", None, SHORTEST_STEP, LONGEST_STEP), None
     )
-    channels: Texts | None = Field(
-        None, description="compared channels; default: angle and pressures, unless locked or prescribed"
+    channels: tuple[str, ...] | None = keyed(
+        "compared channels; default: angle and pressures, unless locked or prescribed", None
     )
-    noise: NoiseSection = Field(
-        NoiseSection(), description="least standard deviation by channel, '0.1 deg', '500 Pa_d'; default: none"
+    noise: NoiseSection = keyed(
+        "least standard deviation by channel, '0.1 deg', '500 Pa_d'; default: none", NoiseSection()
     )
-    inputs: Texts | None = Field(
-        None, description=f"recorded channels used as inputs of the run: {', '.join(ALL_INPUTS)}"
+    inputs: tuple[str, ...] | None = keyed(
+        f"recorded channels used as inputs of the run: {', '.join(ALL_INPUTS)}", None
     )
-    locked: Annotated[float, Quantified("rad")] | None = Field(
-        None, description="angle at which the vane is locked, such as '75 deg'; without a scenario"
+    locked: float | None = keyed(
+        Number("rad", "angle at which the vane is locked, such as '75 deg'; without a scenario"), None
     )
-    volume: Annotated[float, Quantified("m^3", above=0.0)] | None = Field(
-        None, description="fixed volume in place of the vane, '60 cm^3'; without a scenario"
-    )
-    initial_state: Literal["scenario", "recording", "fitted"] | None = Field(
+    volume: float | None = keyed(
+        Number(
+            "m^3", "fixed volume in place of the vane, '60 cm^3'; without a scenario", None, 0.0, minimum_allowed=False
+        ),
         None,
-        description="state at the start; 'recording' and 'fitted' are one; default: the scenario, else the recording",
     )
-    time_offset: Annotated[float, Quantified("s", above=0.0)] | None = Field(
-        None, description="limit of a fitted delay of the samples behind the run, '20 ms'"
+    initial_state: Literal["scenario", "recording", "fitted"] | None = keyed(
+        "state at the start; 'recording' and 'fitted' are one; default: the scenario, else the recording", None
+    )
+    time_offset: float | None = keyed(
+        Number("s", "limit of a fitted delay of the samples behind the run, '20 ms'", None, 0.0, minimum_allowed=False),
+        None,
     )
 
 
-class CandidateSection(StrictTable):
+@dataclass(frozen=True, slots=True)
+class CandidateSection:
     """Table [[trajectory.candidates]]: possible next experiment."""
 
     label: _Label
-    scenario: Text = Field(description="name of a scenario, or a file relative to this one")
-    overrides: Texts = Field((), description="changes to the scenario")
-    noise: NoiseSection = Field(NoiseSection(), description="by channel; default: what the fit finds")
-    interval: Annotated[float, Quantified("s", SHORTEST_STEP)] = Field(
-        default_factory=lambda: 1.0e-3, description="time between two samples; default 1 ms"
-    )
+    scenario: str = keyed("name of a scenario, or a file relative to this one")
+    overrides: tuple[str, ...] = keyed("changes to the scenario", ())
+    noise: NoiseSection = keyed("by channel; default: what the fit finds", NoiseSection())
+    interval: float = keyed(Number("s", "time between two samples; default 1 ms", minimum=SHORTEST_STEP), 1.0e-3)
 
 
-class TrajectorySection(StrictTable):
+@dataclass(frozen=True, slots=True)
+class TrajectorySection:
     """Table [trajectory] of a problem file."""
 
-    parameters: tuple[ParameterSection, ...] = Field(strict=False, min_length=1, description="free parameters")
-    experiments: tuple[ExperimentSection, ...] = Field(strict=False, min_length=1, description="recordings to explain")
+    parameters: tuple[ParameterSection, ...] = keyed("free parameters")
+    experiments: tuple[ExperimentSection, ...] = keyed("recordings to explain")
     confidence: Confidence = 0.95
-    candidates: tuple[CandidateSection, ...] = Field(
-        (), strict=False, description="experiments to rank by the information that they would bring"
-    )
+    candidates: tuple[CandidateSection, ...] = keyed("experiments to rank by the information that they would bring", ())
 
 
-class DeviceProblem(StrictTable):
+@dataclass(frozen=True, slots=True)
+class DeviceProblem:
     """Table [device] of a problem file: initial parameter set, chosen valve and overrides."""
 
-    set: Text = Field(description="name of a parameter set, or a path relative to this file")
-    valve: Text | None = Field(None, description="name of a valve of the set; default: the chosen one")
-    overrides: Texts = Field((), description="overrides of the set, kept in the new set")
+    set: str = keyed("name of a parameter set, or a path relative to this file")
+    valve: str | None = keyed("name of a valve of the set; default: the chosen one", None)
+    overrides: tuple[str, ...] = keyed("overrides of the set, kept in the new set", ())
 
 
-class CitationSection(StrictTable):
-    """Table [citation] of a problem file, as of a parameter set."""
-
-    title: Text
-    authors: Texts = ()
-    year: Annotated[int | None, Field(ge=1800, le=2200)] = None
-    doi: str = ""
-    note: str = ""
-
-
-class ProblemFile(StrictTable):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProblemFile:
     """Layout of a problem file: initial parameter set, recordings, procedures and trajectory fit."""
 
     schema_version: SchemaVersion
-    name: str = Field(pattern=NAME, max_length=100, description="name of the new parameter set")
-    title: str = Field("", description="title of the new parameter set")
-    device: DeviceProblem = Field(description="the set to start from")
-    citation: CitationSection | None = Field(
-        None, description="authors of the measurements; default: as in the starting set"
-    )
-    columns: dict[str, ColumnMap] = Field({}, description="column maps by name, for files with columns of other names")
-    bench: Tolerances | None = Field(None, description="tolerances of the bench")
-    procedure: tuple[Annotated[BenchProblem, Field(discriminator="kind")], ...] = Field(
-        (), strict=False, min_length=1, description="bench procedures to apply"
-    )
-    trajectory: TrajectorySection | None = Field(
-        None, description="fit to recordings of motion, after the bench procedures"
-    )
+    name: str = keyed(Words("name of the new parameter set", pattern=SHORT_NAME))
+    title: str = keyed("title of the new parameter set", "")
+    device: DeviceProblem = keyed("the set to start from")
+    citation: Citation | None = keyed("authors of the measurements; default: as in the starting set", None)
+    columns: Mapping[str, ColumnMap] = keyed("column maps by name, for files with columns of other names", dict)
+    bench: Tolerances | None = keyed("tolerances of the bench", None)
+    procedure: tuple[BenchProblem, ...] = keyed("bench procedures to apply", ())
+    trajectory: TrajectorySection | None = keyed("fit to recordings of motion, after the bench procedures", None)
 
 
 def load_problem(path: str | Path) -> ProblemFile:
@@ -175,7 +174,7 @@ def parse_problem(content: bytes, file: str, folder: Path | None = None) -> Prob
 
     Raises IdentificationError for an invalid file, and for recordings that are not in its ``folder``.
     """
-    problem = validate(ProblemFile, _FILE.parse(content, file), file, IdentificationError, content)
+    problem = checked_record(ProblemFile, _FILE.parse(content, file), file, IdentificationError, content)
     # Each may be left out, which the layout allows, but not both.
     if not problem.procedure and problem.trajectory is None:
         raise IdentificationError(f"{file}: has neither a [[procedure]] nor a [trajectory]")
@@ -207,5 +206,5 @@ def parse_problem(content: bytes, file: str, folder: Path | None = None) -> Prob
     return problem
 
 
-json_schema = partial(make_schema, ProblemFile, "ppafo identification problem")
+json_schema = partial(record_schema, ProblemFile, "ppafo identification problem")
 """JSON Schema of a problem file."""

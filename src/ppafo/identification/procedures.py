@@ -118,7 +118,7 @@ def _in_unit(recording: Recording, names: Iterable[str], factor: float, atmosphe
 BenchProblem = StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | ValveMapProblem | VaneLeakProblem
 """Bench laws in the recommended order: each after those whose results it uses."""
 LAWS: dict[str, type[BenchLaw]] = {
-    kind: law for law in get_args(BenchProblem) for kind in get_args(law.model_fields["kind"].annotation)
+    kind: law for law in get_args(BenchProblem) for kind in get_args(law.__annotations__["kind"])
 }
 """Bench laws by kind, in the recommended order."""
 

@@ -4,15 +4,17 @@ Usual errors of sensors and supply are defined in ``usual_errors.py``. A set sta
 which is 1.96 standard deviations.
 """
 
+import math
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pydantic import Field
-
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.models import Quantified, StrictTable, Text
 from ppafo.errors import IdentificationError, UnitError, refused_as
 from ppafo.identification.estimate import interval_factor
+from ppafo.model.declaration import Number, Quantity
+from ppafo.parameters.declared import Words
 from ppafo.parameters.parameter_set import CONFIDENCE
+from ppafo.parameters.records import keyed
 from ppafo.simulation.recorded.usual_errors import ANGLE_ERRORS, PRESSURE_ERRORS, SUPPLY_ERROR, deviation_of_limit
 from ppafo.units import parse_quantity
 
@@ -45,71 +47,80 @@ _OTHER_SETTING = 0.1
 """Default relative limit [-] of all other parameters, such as settings of valves and effects."""
 _LARGEST_FRACTION = 0.5
 """Largest relative limit [-] that may be stated; beyond it a sensor is broken rather than inaccurate."""
-Columns = Annotated[Text | None, Field(description="name of a column map; default: units in the header of the file")]
-Confidence = Annotated[float, Field(gt=0.5, lt=1.0, description="confidence of the intervals; default 0.95")]
+Columns = Annotated[str | None, Words("name of a column map; default: units in the header of the file")]
+Confidence = Annotated[
+    float,
+    Number(
+        "",
+        "confidence of the intervals; default 0.95",
+        minimum=0.5,
+        maximum=math.nextafter(1.0, 0.0),
+        minimum_allowed=False,
+        plain=True,
+    ),
+]
 
 
-Limit = Annotated[float, Quantified("1", 0.0, _LARGEST_FRACTION)]
-PressureLimit = Annotated[float, Quantified("Pa_d", 0.0)]
-AngleLimit = Annotated[float, Quantified("rad", 0.0)]
+def _limit(unit: str, summary: str, largest: float = math.inf) -> Quantity:
+    return Quantity("", unit, summary, minimum=0.0, maximum=largest)
 
 
-class Tolerances(StrictTable):
+def _share(summary: str) -> Quantity:
+    return _limit("1", summary, _LARGEST_FRACTION)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tolerances:
     """Table [bench] of a problem file: limits (+-) of uncertain quantities, in SI or as fractions; 0 for an exact one.
 
     None means the default of the channel or parameter. Errors named in ``each_recording`` differ between recordings.
     """
 
-    load: Limit = Field(
-        default_factory=lambda: 0.02, description="tolerance of the external torque, for each recording; default 2 %"
+    load: float = keyed(_share("tolerance of the external torque, for each recording; default 2 %"), 0.02)
+    supply: float = keyed(
+        _limit("Pa_d", "tolerance of each supply pressure, for each recording; default 1 psi_d"), SUPPLY_ERROR
     )
-    supply: PressureLimit = Field(
-        default_factory=lambda: SUPPLY_ERROR,
-        description="tolerance of each supply pressure, for each recording; default 1 psi_d",
+    zero_of_angle: float = keyed(
+        _limit("rad", "tolerance of the zero of the angle sensor; default 0.5 deg"), ANGLE_ERRORS.zero
     )
-    zero_of_angle: AngleLimit = Field(
-        default_factory=lambda: ANGLE_ERRORS.zero,
-        description="tolerance of the zero of the angle sensor; default 0.5 deg",
+    zero_of_pressure: float = keyed(
+        _limit("Pa_d", "tolerance of the zero of each pressure sensor; default 0.3 psi_d"), PRESSURE_ERRORS.zero
     )
-    zero_of_pressure: PressureLimit = Field(
-        default_factory=lambda: PRESSURE_ERRORS.zero,
-        description="tolerance of the zero of each pressure sensor; default 0.3 psi_d",
+    gain: float | None = keyed(
+        _share("tolerance of the gain of each sensor; default 0.5 %, 0 % for the angle sensor"), None
     )
-    gain: Limit | None = Field(
-        None, description="tolerance of the gain of each sensor; default 0.5 %, 0 % for the angle sensor"
+    lag: float | None = keyed(
+        _limit("s", "tolerance of the time constant of each sensor; default 20 ms, 1 ms for the angle sensor"), None
     )
-    lag: Annotated[float, Quantified("s", 0.0)] | None = Field(
-        None, description="tolerance of the time constant of each sensor; default 20 ms, 1 ms for the angle sensor"
-    )
-    start_of_angle: AngleLimit | None = Field(
+    start_of_angle: float | None = keyed(
+        _limit(
+            "rad",
+            "tolerance of the initial angle of each recording, unless at a stop; default 0.05 deg if it is read from "
+            "the recording, else as zero_of_angle",
+        ),
         None,
-        description="tolerance of the initial angle of each recording, unless at a stop; default 0.05 deg if it is "
-        "read from the recording, else as zero_of_angle",
     )
-    start_of_pressure: PressureLimit | None = Field(
-        None, description="tolerance of both initial pressures; default: the noise of a sample if they are measured"
+    start_of_pressure: float | None = keyed(
+        _limit("Pa_d", "tolerance of both initial pressures; default: the noise of a sample if they are measured"), None
     )
-    each_recording: tuple[Sensed, ...] = Field(
-        (), strict=False, description="sensor errors that differ between recordings: 'zero', 'gain'; default: none"
+    each_recording: tuple[Sensed, ...] = keyed(
+        "sensor errors that differ between recordings: 'zero', 'gain'; default: none", ()
     )
-    gas_temperature: Annotated[float, Quantified("K", 0.0)] | None = Field(
-        None, description="tolerance of the gas temperature; default: from the set, else 15 K"
+    gas_temperature: float | None = keyed(
+        _limit("K", "tolerance of the gas temperature; default: from the set, else 15 K"), None
     )
-    gas_law: Limit | None = Field(None, description="deviation of the gas from the ideal gas law; default 1 %")
-    stribeck_velocity: Annotated[float, Quantified("rad/s", 0.0)] = Field(
-        default_factory=lambda: 0.5,
-        description="speed up to which static friction may last, unless an effect gives it; default 0.5 rad/s",
+    gas_law: float | None = keyed(_share("deviation of the gas from the ideal gas law; default 1 %"), None)
+    stribeck_velocity: float = keyed(
+        _limit("rad/s", "speed up to which static friction may last, unless an effect gives it; default 0.5 rad/s"), 0.5
     )
-    zero_of_flow: Limit = Field(
-        default_factory=lambda: 0.05,
-        description="tolerance of the zero of the flow meter, relative to its largest reading; default 5 %",
+    zero_of_flow: float = keyed(
+        _share("tolerance of the zero of the flow meter, relative to its largest reading; default 5 %"), 0.05
     )
-    friction: Limit = Field(
-        default_factory=lambda: 0.05,
-        description="variation of friction between recordings; default 5 % if a procedure has several",
+    friction: float = keyed(
+        _share("variation of friction between recordings; default 5 % if a procedure has several"), 0.05
     )
-    held: Limit | None = Field(
-        None, description="uncertainty of values of the set that state none; default: 1 to 50 % by kind"
+    held: float | None = keyed(
+        _share("uncertainty of values of the set that state none; default: 1 to 50 % by kind"), None
     )
 
     def zero_of(self, channel: str) -> float:
@@ -145,7 +156,7 @@ class Tolerances(StrictTable):
         return deviation_of_limit(abs(value) * (HELD.get(path, _OTHER_SETTING) if self.held is None else self.held))
 
 
-DEFAULTS = Tolerances.model_construct()
+DEFAULTS = Tolerances()
 """Tolerances of a bench without a table [bench]."""
 
 

@@ -6,6 +6,7 @@ import operator
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -52,7 +53,6 @@ SAME_STOP = 1.0e-9
 """Angle difference [rad] below which two angles count as the same."""
 COVERED_PRESSURE = 1.01
 """Largest ratio of supply pressure to the highest pressure of a volume table [-]."""
-_BESIDE_ANOTHER = "; both supplies must be on the same side of atmospheric pressure"
 _UNUSED_VOLUME = 1.0e-6
 """Constant volume [m^3] of chamber 2 for an actuator with one chamber; no gas flows into it."""
 _NO_LEAK = Orifice(area=0.0, discharge_coefficient=1.0)
@@ -71,7 +71,7 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
     links = links_of_set(parameter_set) if links is None else links
     parameter_set = with_followers(parameter_set)
     device = read_device(parameter_set, name, links)
-    for _, line in contradictions(parameter_set, device):
+    for _, line in contradictions_of_set(parameter_set, device):
         raise ParameterError(f"{parameter_set.file}: {line}")
     if device.actuator.kind != VANE:
         # An actuator of another kind has what a vane of its mean size would have, for whatever is made for a vane.
@@ -123,28 +123,11 @@ def read_device(parameter_set: ParameterSet, name: str, links: Graph) -> Device:
     )
 
 
-def contradictions(parameter_set: ParameterSet, device: Device) -> Iterator[tuple[tuple[str, ...], str]]:
+def contradictions_of_set(parameter_set: ParameterSet, device: Device) -> Iterator[tuple[tuple[str, ...], str]]:
     """Yield contradictions between the values of a set that prevent a run: their paths, and a message."""
-    actuator = device.actuator
-    stops = ("actuator.angle_min", "actuator.angle_max")
-    is_ordered = actuator.angle_min < actuator.angle_max
-    problem = actuator_problem(actuator) if is_ordered else ""
-    if problem:
-        settings = (f"actuator.{quantity.name}" for quantity in ACTUATORS[actuator.kind].quantities)
-        yield ("actuator", *settings, *stops), f"actuator: {problem}"
-    is_beyond, line = beyond_pressures(device)
-    if is_beyond:
-        yield SUPPLIES, f"actuator: {line(0)}"
-    for path, relation, other, holds in consistency(device):
-        if not holds:
-            limit, room = number_under(device, other.split(".")), device.supply.atmospheric_pressure
-            named = [re.sub("^valve[.]", f"valves.{device.valve_name}.", name) for name in (path, other)]
-            # In the unit of the number at fault: a gauge pressure beside an absolute one would have to be converted.
-            entry, si_unit = parameter_set.numbers[named[0]], parameter_set.declarations()[named[0]].unit
-            unit = entry.unit if declaration.fits(entry.unit, si_unit) else ""
-            allowed = f"{relation} {named[1]} = {shown_text(limit, si_unit, atmosphere=room, unit=unit)}"
-            why = _BESIDE_ANOTHER if path in SUPPLIES else ""
-            yield tuple(named), f"{named[0]} = {entry_text(entry)} must be {allowed}{why}"
+    for paths, (is_bad, line) in contradictions(device, parameter_set):
+        if is_bad:
+            yield paths, line(0)
     if device.supply.is_vacuum and declaration.RELIEVING_PATH in parameter_set.flags and not device.supply.relieving:
         yield (
             (declaration.RELIEVING_PATH, *SUPPLIES),
@@ -158,21 +141,50 @@ def contradictions(parameter_set: ParameterSet, device: Device) -> Iterator[tupl
             (f"{SECTION}.opening",),
             f"{SECTION}.opening: a set with a table has one proportional valve, not {' and '.join(valves)}",
         )
-    if actuator.kind != VANE and is_ordered and not problem:
-        is_bad, line = growth_and_problem(device)[1]
-        if is_bad:
-            yield ("actuator", *stops), f"actuator: {line(0)}"
 
 
-def growth_and_problem(device: Device) -> tuple[Any, Problem]:
-    """Return mean growth of chamber 1 with angle [m^3/rad], and the problem if not positive; elementwise over runs."""
-    # That of a vane is a number of its set, which is above 0.
-    growth = device.actuator.displacement_per_radian if device.actuator.kind == VANE else shape_and_growth(device)[1]
+def contradictions(device: Device, stated: ParameterSet | None = None) -> Iterator[tuple[tuple[str, ...], Problem]]:
+    """Yield what numbers of a device may contradict, elementwise over runs: their paths, and the problem.
 
-    def line(run: int) -> str:
-        return f"chamber 1 must grow with the angle, but changes by {at(growth, run):.4g} m^3/rad at supply pressure"
+    Numbers are shown as the set that ``stated`` them has them. Later problems rely on earlier ones.
+    """
+    actuator, stops = device.actuator, ("actuator.angle_min", "actuator.angle_max")
+    for path, relation, other, holds in consistency(device):
+        paths = tuple(re.sub("^valve[.]", f"valves.{device.valve_name}.", name) for name in (path, other))
+        yield paths, (np.logical_not(holds), partial(_rule_line, device, stated, path, relation, other))
+    is_misshapen: Any = True
+    if np.all(actuator.angle_min < actuator.angle_max):
+        is_misshapen, line = _shape_problem(actuator)
+        settings = (f"actuator.{quantity.name}" for quantity in ACTUATORS[actuator.kind].quantities)
+        yield ("actuator", *settings, *stops), (is_misshapen, line)
+    yield SUPPLIES, _beyond_pressures(device)
+    if not np.any(is_misshapen):
+        # The growth of a vane is a number of its set, which is above 0.
+        growth = actuator.displacement_per_radian if actuator.kind == VANE else shape_and_growth(device)[1]
+        yield ("actuator", *stops), (np.logical_not(growth > 0.0), partial(_growth_line, growth))
 
-    return growth, (np.logical_not(growth > 0.0), line)
+
+def _rule_line(device: Device, stated: ParameterSet | None, path: str, relation: str, other: str, run: int) -> str:
+    """Return the message on two numbers that break a rule; in the unit of the number at fault, if a set states it."""
+    room, names = at(device.supply.atmospheric_pressure, run), [path, other]
+    own = [re.sub("^valve[.]", f"valves.{device.valve_name}.", name) for name in names]
+    unit = declaration.quantities({device.valve_name: device.valve.kind}, device.actuator.kind)[own[0]].unit
+    number, limit = (at(number_under(device, name.split(".")), run) for name in names)
+    if stated is None:
+        texts = [shown_text(each, unit, ".9g", room) for each in (number, limit)]
+    else:
+        # A gauge pressure beside an absolute one would have to be converted.
+        names, entry = own, stated.numbers[own[0]]
+        given = entry.unit if declaration.fits(entry.unit, unit) else ""
+        texts = [entry_text(entry), shown_text(limit, unit, atmosphere=room, unit=given)]
+    why = "; both supplies must be on the same side of atmospheric pressure" if stated and path in SUPPLIES else ""
+    return f"{names[0]} = {texts[0]} must be {relation} {names[1]} = {texts[1]}{why}"
+
+
+def _growth_line(growth: Any, run: int) -> str:
+    return (
+        f"actuator: chamber 1 must grow with the angle, but changes by {at(growth, run):.4g} m^3/rad at supply pressure"
+    )
 
 
 def _present(parameter_set: ParameterSet, section: str) -> tuple[Quantity, ...]:
@@ -202,23 +214,35 @@ def _actuator(parameter_set: ParameterSet, read: Reader) -> Actuator:
     )
 
 
-def actuator_problem(actuator: Actuator) -> str:
-    """Return a message on contradictory actuator numbers; empty if consistent."""
-    stops = Range(**{name: getattr(actuator, name) for name in Range._fields})
+def _shape_problem(actuator: Actuator) -> Problem:
+    """Return the problem of actuator numbers that contradict each other although each is in range."""
     kind, table = ACTUATORS[actuator.kind], actuator.table
-    problem = "" if kind.problem is None else kind.problem(actuator, stops)
-    if problem or table is None:
-        return problem
-    if table.first_angle <= stops.angle_min + SAME_STOP and stops.angle_max <= table.last_angle + SAME_STOP:
-        return ""
-    measured, wanted = (
-        f"{math.degrees(low):.4g} to {math.degrees(high):.4g} deg"
-        for low, high in ((table.first_angle, table.last_angle), (stops.angle_min, stops.angle_max))
-    )
-    return f"the volume table covers {measured}, but the stops are at {wanted}"
+    if kind.problem is None and table is None:
+        return False, str
+    numbers = {**{name: getattr(actuator, name) for name in Range._fields}, **actuator.settings}
+    varied = [value for value in numbers.values() if isinstance(value, np.ndarray)]
+
+    def problem_of(run: int) -> str:
+        single = {name: at(value, run) for name, value in numbers.items()}
+        stops = Range(**{name: single.pop(name) for name in Range._fields})
+        problem = (
+            "" if kind.problem is None else kind.problem(replace(actuator, **stops._asdict(), settings=single), stops)
+        )
+        low, high = stops.angle_min + SAME_STOP, stops.angle_max - SAME_STOP
+        if not problem and table is not None and not (table.first_angle <= low and high <= table.last_angle):
+            measured, wanted = (
+                f"{math.degrees(first):.4g} to {math.degrees(last):.4g} deg"
+                for first, last in ((table.first_angle, table.last_angle), (stops.angle_min, stops.angle_max))
+            )
+            problem = f"the volume table covers {measured}, but the stops are at {wanted}"
+        return f"actuator: {problem}" if problem else ""
+
+    # A kind checks single numbers, so the runs are gone through one by one.
+    problems = [problem_of(run) for run in range(varied[0].size if varied else 1)]
+    return (np.array([bool(line) for line in problems]) if varied else bool(problems[0])), problems.__getitem__
 
 
-def beyond_pressures(device: Device) -> Problem:
+def _beyond_pressures(device: Device) -> Problem:
     """Return the problem of a supply outside the measured pressures of a volume table; elementwise over runs."""
     table, supply = device.actuator.table, device.supply
     if table is None:
@@ -238,7 +262,7 @@ def beyond_pressures(device: Device) -> Problem:
         atmosphere = at(supply.atmospheric_pressure, run)
         with shown_in(counted_from(device.units, atmosphere)):
             covered, has = (shown_text(atmosphere + each, "Pa_a", ".4g") for each in (end, at(gauge, run)))
-        return f"the volume table covers pressures {way} to {covered}, but the supply has {has}"
+        return f"actuator: the volume table covers pressures {way} to {covered}, but the supply has {has}"
 
     return is_beyond, line
 

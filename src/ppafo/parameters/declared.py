@@ -9,8 +9,8 @@ import copy
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import MISSING, dataclass, field, fields, replace
-from typing import Any, get_args, get_type_hints
+from dataclasses import dataclass, field
+from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.faults import line_of, no_table, refuse, unknown_key
@@ -29,15 +29,20 @@ PLAIN = ("", "1")
 """Units of a plain number."""
 SHORT_NAME = r"^[a-z0-9][a-z0-9_-]{0,99}$"
 """Pattern of the name of a scenario."""
+ANY_KEY, FILLED = r"(?s).*", r"(?s).+"
+"""Patterns of a name that may be any text, and of a text that is not empty."""
 FREE_KEY = r"^[A-Za-z0-9_-]+$"
 """Pattern of a free key: a dotted path names it, so a dot or a blank in it would make it another path."""
+IDENTIFIER = r"^[a-z][a-z0-9_]*$"
 JOINT_WORDS = r"^[a-z][a-z ]{0,39}$"
 LABEL = r"^(?=.{1,100}$)[^\x00-\x20\x7f-\xa0](?:[^\x00-\x1f\x7f-\x9f]*[^\x00-\x20\x7f-\xa0])?$"
 """Pattern of a display name."""
 RULES = {
     NAME: NAME_RULE,
+    FILLED: "must not be empty",
     SHORT_NAME: f"{NAME_RULE}, at most 100",
     FREE_KEY: "must consist of letters, digits, '-' and '_'",
+    IDENTIFIER: "must begin with a lower-case letter, and consist of lower-case letters, digits and '_'",
     JOINT_WORDS: "must consist of lower-case letters and blanks, at most 40",
     LABEL: "must be one line of text without leading or trailing spaces, of at most 100 characters",
 }
@@ -45,18 +50,18 @@ RULES = {
 _FORMS: Mapping[type, str] = {
     str: "a text in quotation marks",
     bool: "true or false",
-    dict: "a table of texts",
     float: "a finite number, or a text with its unit",
+    int: "a whole number from 1 on, or a text in quotation marks",
 }
-_TAKEN: Mapping[type, Any] = {float: str | int | float}
+_TAKEN: Mapping[type, Any] = {float: str | int | float, int: str | int}
 
 
 @dataclass(frozen=True, slots=True)
 class Words:
     """Field that is no number in a known unit: a text, true or false, or another ``form``.
 
-    With ``form`` dict it is a table of texts with keys of any kind, with float a number or a text with its unit. A
-    ``default`` is the value of a ``kind`` that may be omitted.
+    With ``form`` float it is a number or a text with its unit, with
+    int a whole number from 1 on or a text. A ``default`` is the value of a ``kind`` that may be omitted.
     """
 
     summary: str = ""
@@ -71,26 +76,35 @@ class Words:
 
 @dataclass(frozen=True, slots=True)
 class InnerTable:
-    """Table of a file; with ``keys``, a pattern, its keys are free names."""
+    """Table of a file, or one of the ``words`` in its place; with ``keys``, a pattern, its keys are free names."""
 
     summary: str = ""
     required: bool = False
     keys: str = ""
+    words: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Many:
     """List of at least ``least`` values of one field, or of tables, whose fields ``of`` returns for each.
 
-    A file may have one of the ``words`` in place of the list.
+    With ``keys``, a pattern, it is a table of them with free names. A file may have one of the ``words`` in its place,
+    or, if it ``may_be_one``, a value alone.
     """
 
-    of: "Quantity | Words | Declare"
+    of: "Field | Declare"
     summary: str = ""
     required: bool = False
     least: int = 0
     most: float = math.inf
     words: tuple[str, ...] = ()
+    keys: str = ""
+    may_be_one: bool = False
+
+    def holds(self, value: Any) -> bool:
+        """Return whether a value is such a list or table, whatever is in it."""
+        is_form = isinstance(value, Mapping) if self.keys else isinstance(value, list | tuple)
+        return is_form and self.least <= len(value) <= self.most
 
 
 Field = Quantity | Words | InnerTable | Many
@@ -125,19 +139,6 @@ def numbers(section: str, quantities: Iterable[Quantity]) -> dict[str, Quantity]
 def inside(path: str, fields: Fields, summary: str = "", required: bool = False) -> dict[str, Field]:
     """Return the fields of a table at a path."""
     return {path: InnerTable(summary, required), **{f"{path}.{name}": field for name, field in fields.items()}}
-
-
-def fields_of(record: type[Any]) -> dict[str, Field]:
-    """Return the fields that a dataclass declares; one with a default may be omitted."""
-    hints, found = get_type_hints(record, include_extras=True), dict[str, Field]()
-    for item in fields(record):
-        is_given = item.default is MISSING
-        for declared in get_args(hints[item.name])[1:]:
-            if isinstance(declared, Quantity):
-                found[item.name] = replace(declared, name=item.name, optional=not is_given)
-            elif isinstance(declared, Words | Many):
-                found[item.name] = replace(declared, required=is_given)
-    return found
 
 
 def quantities_in(fields: Fields) -> dict[str, Quantity]:
@@ -242,33 +243,35 @@ class FieldLayout:
                 yield _joined(path, one_line(key)), f"[{path}.{one_line(key)}]: a name has no dot; write {joined}"
 
     def _inside(self, path: str, value: Any) -> Iterator[tuple[str, str]]:
-        field = self.fields.get(path, InnerTable())
+        field: Any = self.fields.get(path, InnerTable())
+        if isinstance(field, Many) and field.may_be_one and not isinstance(value, list | tuple | str):
+            field = field.of
         if isinstance(field, InnerTable) and isinstance(value, Mapping):
             yield from self.faults(value, path)
+        elif isinstance(field, InnerTable | Many) and isinstance(value, str) and value in field.words:
+            return
         elif isinstance(field, InnerTable):
             required = [gap.rpartition(".")[2] for gap, _ in self._gaps(path, is_given=True)]
-            yield path, no_table(path, value, required)
-        elif isinstance(field, Many) and isinstance(value, list | tuple) and field.least <= len(value) <= field.most:
-            of = field.of
-            for number, item in enumerate(value, 1):
-                at = f"{path}.{number}"
-                if isinstance(of, Quantity | Words):
-                    yield from ((at, fault) for fault in [self._of_value(at, of, item)] if fault)
-                elif isinstance(item, Mapping):
-                    yield from layout_of(
-                        {f"{at}.{name}": each for name, each in of(item).items()}, self.reads_numbers
-                    ).faults(item, at)
-                else:
-                    yield at, f"{at} = {quote(item)} must be a table, [[{path}]]"
-        elif isinstance(field, Many) and not (isinstance(value, str) and value in field.words):
-            of, count = field.of, f"{field.least} or more " * (field.least > 0)
-            what = (
-                "numbers" if isinstance(of, Quantity) else "texts" if isinstance(of, Words) else f"tables, [[{path}]]"
-            )
+            yield path, no_table(path, value, required) + "".join(f", or '{word}'" for word in field.words)
+        elif isinstance(field, Many) and field.holds(value):
+            for name, item in value.items() if field.keys else enumerate(value, 1):
+                at, of = f"{path}.{one_line(name)}", field.of
+                if field.keys and not re.fullmatch(field.keys, str(name)):
+                    yield at, f"{path}: the name {quote(name)} {RULES[field.keys]}"
+                    continue
+                own = {at: of} if isinstance(of, Field) else inside(at, of(item if isinstance(item, Mapping) else {}))
+                yield from layout_of(own, self.reads_numbers)._inside(at, item)
+        elif isinstance(field, Many):
+            count, names = f"{field.least} or more " * (field.least > 0), ("numbers", "texts", "tables")
+            what = names[[isinstance(field.of, Quantity), isinstance(field.of, Words), True].index(True)]
+            what += f", [[{path}]]" * (what == "tables" and not field.keys)
             most = f", at most {field.most:g}" * math.isfinite(field.most)
             word = "".join(f", or '{word}'" for word in field.words)
-            yield path, f"{path} = {quote(value)} must be a list of {count}{what}{most}{word}"
-        elif not isinstance(field, Many) and (fault := self._of_value(path, field, value)):
+            yield (
+                path,
+                f"{path} = {quote(value)} must be a {'table' if field.keys else 'list'} of {count}{what}{most}{word}",
+            )
+        elif fault := self._of_value(path, field, value):
             yield path, fault
 
     def _gaps(self, path: str, is_given: bool = False) -> Iterator[tuple[str, str]]:
@@ -303,12 +306,10 @@ class FieldLayout:
         is_taken = isinstance(value, _TAKEN.get(field.form, field.form)) and isinstance(value, bool) == (
             field.form is bool
         )
-        if not is_taken or (isinstance(value, float) and not math.isfinite(value)):
+        is_below = field.form is int and isinstance(value, int) and value < 1
+        if not is_taken or is_below or (isinstance(value, float) and not math.isfinite(value)):
             return f"{given} must be {_FORMS[field.form]}{': ' * bool(field.summary)}{field.summary}"
-        for name, item in value.items() if isinstance(value, dict) else ():
-            if not (isinstance(name, str) and isinstance(item, str)):
-                return f"{path}.{one_line(name)} = {quote(item)} must be a text in quotation marks"
-        if field.pattern and not re.fullmatch(field.pattern, value):
+        if field.pattern and isinstance(value, str) and not re.fullmatch(field.pattern, value):
             return f"{given} {RULES[field.pattern]}"
         return f"{given} must not be empty" if field.required and field.is_filled and value == "" else ""
 
@@ -424,10 +425,11 @@ def _schema(
         of = field.of
         items = (
             _schema(of, declare, document, path, definitions)
-            if isinstance(of, Quantity | Words)
+            if isinstance(of, Field)
             else _table_schema(of, {}, "", definitions)
         )
-        form = {"type": "array", "items": items, "minItems": field.least}
+        named = {"type": "object", "patternProperties": {field.keys: items}, "minProperties": field.least}
+        form = named if field.keys else {"type": "array", "items": items, "minItems": field.least}
         form = {"anyOf": [form, {"enum": list(field.words)}]} if field.words else form
     elif isinstance(field, Words):
         texts: dict[str, Any] = {"type": "string"} | ({"pattern": field.pattern} if field.pattern else {})
@@ -435,7 +437,6 @@ def _schema(
         forms: dict[type, dict[str, Any]] = {
             bool: {"type": "boolean"},
             float: {"type": ["string", "number"]},
-            dict: {"type": "object", "additionalProperties": texts},
         }
         form = {"enum": list(field.allowed)} if field.allowed else forms.get(field.form, texts)
     return form | ({"description": summary} if summary else {})

@@ -46,10 +46,10 @@ from ppafo.parameters.parameter_set import (
     ParameterSet,
     TextEntry,
     chosen_valve,
-    number_entry,
     written,
     written_units,
 )
+from ppafo.parameters.records import record_from
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.units import check_unit
 from ppafo.wording import nearest_name
@@ -193,7 +193,7 @@ def _parameter_set(document: Mapping[str, Any], fields: Fields, file: str, folde
     numbers: dict[str, Entry] = {}
     for path, table in entries.items():
         if isinstance(fields[f"{path}.value"], Quantity):
-            numbers[path] = number_entry(table)
+            numbers[path] = record_from(Entry, table)
         elif isinstance(table["value"], bool):
             flags[path] = FlagEntry(**table)
         else:
@@ -212,7 +212,7 @@ def _parameter_set(document: Mapping[str, Any], fields: Fields, file: str, folde
     return ParameterSet(
         file=file,
         **{name: document.get(name, "") for name in ("name", "title", "notes", "completed_by", "default_valve")},
-        citation=None if citation is None else Citation(**{**citation, "authors": tuple(citation.get("authors", ()))}),
+        citation=None if citation is None else record_from(Citation, citation),
         parent=beside(parent, folder, list_sets()) if parent else "",
         valve_kinds={name: valve["kind"] for name, valve in document["valves"].items()},
         actuator_kind=kind,

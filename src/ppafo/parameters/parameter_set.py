@@ -11,7 +11,7 @@ from ppafo.errors import ParameterError, UnitError, refused_as
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.declaration import Number, Quantity
 from ppafo.parameters.declaration import alternatives, fits, is_within, quantities, range_rule
-from ppafo.parameters.declared import Many, Words, fields_of
+from ppafo.parameters.declared import Many, Words
 from ppafo.parameters.graph import (
     ATMOSPHERE_PATH,
     DISPLACEMENT_PATH,
@@ -24,6 +24,7 @@ from ppafo.parameters.graph import (
     gauge_link,
 )
 from ppafo.parameters.joint import ANKLE, JointNames
+from ppafo.parameters.records import fields_of
 from ppafo.units import SI, base_value, format_quantity, split_quantity, to_si
 from ppafo.units.shown import shown_unit, units_beside
 from ppafo.wording import known_names
@@ -93,11 +94,6 @@ class Citation:
 
 
 NUMBER_ENTRY, TEXT_ENTRY, FLAG_ENTRY, CITATION = map(fields_of, (Entry, TextEntry, FlagEntry, Citation))
-
-
-def number_entry(table: Mapping[str, Any]) -> Entry:
-    """Return the entry of a table that has been checked."""
-    return Entry(**{**table, **{name: float(table[name]) for name in ("value", "uncertainty") if name in table}})
 
 
 def written(entry: Entry | TextEntry | FlagEntry | Citation) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity, quantities_of
 from ppafo.model.effects.bandwidth import EFFECT as BANDWIDTH
 from ppafo.parameters.declared import (
+    ANY_KEY,
     SHORT_NAME,
     Content,
     Field,
@@ -102,7 +103,7 @@ def tail(document: Mapping[str, Any]) -> dict[str, Field]:
         **numbers("gas_model", THERMAL_GAS if kind_at(document, "gas_model") == THERMAL else ()),
         SUPPLY_LINE: InnerTable("regulators and lines of the gas; constant pressures unless given"),
         **line_paths(),
-        "assumed": Words("assumed values without a source, with the reason for each", form=dict),
+        "assumed": Many(Words(""), "assumed values without a source, with the reason for each", keys=ANY_KEY),
     }
 
 

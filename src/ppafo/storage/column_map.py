@@ -5,17 +5,18 @@ A map is part of a TOML file, ``[columns.NAME]``. ``foreign.py`` reads a recordi
 
 from collections.abc import Collection, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
 from functools import partial
 from importlib import resources
 from itertools import islice
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field
-
-from ppafo.documents.models import StrictTable, Text, make_schema, read_model
-from ppafo.documents.toml_text import TomlKind
+from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, refused_as
+from ppafo.model.declaration import Number, Quantity
+from ppafo.parameters.declared import Many, Words
+from ppafo.parameters.records import checked_record, keyed, record_schema
 from ppafo.signals import RecordingKind
 from ppafo.signals.recording import TIME, Between, Floats
 from ppafo.storage.clock import ClockForm, DateOrder
@@ -24,91 +25,79 @@ from ppafo.wording import LONGEST_SHOWN, known_names, one_line
 Thousands = Literal["point", "comma", "apostrophe", "blank"]
 
 
-class MappedChannel(StrictTable):
+_Place = Annotated[int | str | None, Words("number of the column from 1, or its name", form=int)]
+_Sign = Literal[1, -1]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MappedChannel:
     """Source of a channel: column or constant. Value in ``unit`` = sign * (factor * number + offset)."""
 
-    column: Annotated[
-        Annotated[int, Field(ge=1)] | Text | None, Field(description="number of the column from 1, or its name")
-    ] = None
-    constant: Annotated[Text | None, Field(description="constant value instead of a column, such as '1 bar_a'")] = None
-    unit: Annotated[str, Field(description="unit of the value, such as 'bar_g'; '-' for a plain number")] = "-"
-    sign: Annotated[Literal[1, -1], Field(description="-1 if the file uses the opposite sign")] = 1
-    factor: Annotated[float, Field(description="conversion factor to the unit, such as bar per volt of a sensor")] = 1.0
-    offset: Annotated[float, Field(description="offset added after the factor, in the unit")] = 0.0
-    times: Annotated[
-        Text | None, Field(description="quantity that multiplies the column, such as a lever arm '0.13 m'")
-    ] = None
-    thousands: Annotated[Thousands | None, Field(description="thousands separator")] = None
-    between: Annotated[
-        Between | None,
-        Field(description="value between samples: 'hold' the earlier one, or 'linear'; default: 'hold' for a command"),
-    ] = None
-    words: Annotated[
-        dict[str, float] | None,
-        Field(
-            description="numbers that replace words in the column; 'direction' also knows up, down, auf, ab and others"
-        ),
-    ] = None
-    at: Annotated[
-        Text | None,
-        Field(description="reference condition of a volume flow: 'ANR', 'DIN 1343' or '0 degC, 1.01325 bar_a'"),
-    ] = None
-    gas: Annotated[
-        Text | None,
-        Field(description="gas of a volume flow, such as 'air' or '0.044 kg/mol'; default: gas of the parameter set"),
-    ] = None
-    rate: Annotated[Text | None, Field(description="time only: sample rate instead of a column, such as '100 Hz'")] = (
-        None
+    column: _Place = None
+    constant: str | None = keyed("constant value instead of a column, such as '1 bar_a'", None)
+    unit: str = keyed("unit of the value, such as 'bar_g'; '-' for a plain number", "-")
+    sign: _Sign = keyed("-1 if the file uses the opposite sign", 1)
+    factor: float = keyed("conversion factor to the unit, such as bar per volt of a sensor", 1.0)
+    offset: float = keyed("offset added after the factor, in the unit", 0.0)
+    times: str | None = keyed("quantity that multiplies the column, such as a lever arm '0.13 m'", None)
+    thousands: Thousands | None = keyed("thousands separator", None)
+    between: Between | None = keyed(
+        "value between samples: 'hold' the earlier one, or 'linear'; default: 'hold' for a command", None
     )
-    date: Annotated[
-        Annotated[int, Field(ge=1)] | Text | None,
-        Field(description="time only: column of the date that belongs to a time of day"),
-    ] = None
-    date_order: Annotated[
-        DateOrder | None, Field(description="time only: order of day and month in a date such as 03/04/2026")
-    ] = None
-    clock: Annotated[ClockForm | None, Field(description="time only: meaning of a text such as 08:10")] = None
+    words: dict[str, float] | None = keyed(
+        "numbers that replace words in the column; 'direction' also knows up, down, auf, ab and others", None
+    )
+    at: str | None = keyed("reference condition of a volume flow: 'ANR', 'DIN 1343' or '0 degC, 1.01325 bar_a'", None)
+    gas: str | None = keyed(
+        "gas of a volume flow, such as 'air' or '0.044 kg/mol'; default: gas of the parameter set", None
+    )
+    rate: str | None = keyed("time only: sample rate instead of a column, such as '100 Hz'", None)
+    date: _Place = keyed(Words("time only: column of the date that belongs to a time of day", form=int), None)
+    date_order: DateOrder | None = keyed("time only: order of day and month in a date such as 03/04/2026", None)
+    clock: ClockForm | None = keyed("time only: meaning of a text such as 08:10", None)
 
 
-class MappedDirection(StrictTable):
+@dataclass(frozen=True, slots=True)
+class MappedDirection:
     """Direction of motion from the rate of a channel: 1, -1, or 0 if too slow; the sweeps are numbered."""
 
-    of: Annotated[Text, Field(description="channel whose rate of change gives the direction")]
-    threshold: Annotated[Text, Field(description="smallest rate that counts as motion, such as '2 mm/s'")]
-    window: Annotated[Text, Field(description="time over which the channel is smoothed, such as '0.2 s'")]
-    sign: Annotated[Literal[1, -1], Field(description="-1 if a rising channel means falling pressure")] = 1
+    of: str = keyed("channel whose rate of change gives the direction")
+    threshold: str = keyed("smallest rate that counts as motion, such as '2 mm/s'")
+    window: str = keyed("time over which the channel is smoothed, such as '0.2 s'")
+    sign: _Sign = keyed("-1 if a rising channel means falling pressure", 1)
 
 
-Trials = Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(strict=False, min_length=1)]
+_TRIALS = Many(
+    Quantity("", "", "number from 1", minimum=1, whole=True),
+    "trials to read, where each trial starts at time 0: a number from 1, a list, or 'all'",
+    least=1,
+    words=("all",),
+    may_be_one=True,
+)
 
 
-class ColumnMap(StrictTable):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ColumnMap:
     """Column map: format of a foreign table, and the channels in its columns."""
 
-    delimiter: Annotated[Literal["comma", "semicolon", "tab", "whitespace"], Field(description="column delimiter")] = (
-        "comma"
+    delimiter: Literal["comma", "semicolon", "tab", "whitespace"] = keyed("column delimiter", "comma")
+    decimal: Literal["point", "comma"] = keyed("decimal mark", "point")
+    encoding: Literal["utf-8", "latin-1"] = keyed("encoding of the text", "utf-8")
+    header: bool = keyed("true if a header line names the columns", True)
+    skip_lines: int = keyed(Number("", "lines before the header, or before the first row", minimum=0, whole=True), 0)
+    skip_rows: int = keyed(
+        Number("", "rows to skip below the header, such as a line of units", minimum=0, whole=True), 0
     )
-    decimal: Annotated[Literal["point", "comma"], Field(description="decimal mark")] = "point"
-    encoding: Annotated[Literal["utf-8", "latin-1"], Field(description="encoding of the text")] = "utf-8"
-    header: Annotated[bool, Field(description="true if a header line names the columns")] = True
-    skip_lines: Annotated[int, Field(ge=0, description="lines before the header, or before the first row")] = 0
-    skip_rows: Annotated[
-        int, Field(ge=0, description="number of rows to skip below the header, such as a line of units")
-    ] = 0
-    trial: Annotated[
-        Literal["all"] | Annotated[int, Field(ge=1)] | Trials | None,
-        Field(description="trials to read, where each trial starts at time 0: a number from 1, a list, or 'all'"),
-    ] = None
-    channels: Annotated[dict[str, MappedChannel], Field(min_length=1, description="channels by name, with 'time'")]
-    direction: Annotated[MappedDirection | None, Field(description="direction from the rate of a channel")] = None
+    trial: Literal["all"] | int | tuple[int, ...] | None = keyed(_TRIALS, None)
+    channels: dict[str, MappedChannel] = keyed("channels by name, with 'time'")
+    direction: MappedDirection | None = keyed("direction from the rate of a channel", None)
 
 
-class _ColumnMaps(BaseModel):
+@dataclass(frozen=True, slots=True)
+class _ColumnMaps:
     """Column maps of a file, by name; a problem file of ``ppafo identify`` has further tables."""
 
-    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
-
-    columns: Annotated[dict[str, ColumnMap], Field(min_length=1, description="column maps by name")]
+    columns: dict[str, ColumnMap] = keyed("column maps by name")
 
 
 _FILE = TomlKind("file of column maps", "columns", resources.files("ppafo.storage"), DataError)
@@ -119,8 +108,9 @@ def load_column_map(path: str | Path, name: str | None = None) -> ColumnMap:
 
     Raises DataError if there is no such map, or if there are several and no name is given.
     """
-    parsed, file = read_model(_FILE, _ColumnMaps, path)
-    maps = parsed.columns
+    file, content = label(str(path)), _FILE.read(path)
+    document = {key: table for key, table in _FILE.parse(content, file).items() if key == "columns"}
+    maps = checked_record(_ColumnMaps, document, file, DataError, content).columns
     if name is None and len(maps) > 1:
         raise DataError(f"{file}: has several column maps; name one as {file}:NAME; available: {', '.join(maps)}")
     if name is not None and name not in maps:
@@ -128,7 +118,7 @@ def load_column_map(path: str | Path, name: str | None = None) -> ColumnMap:
     return maps[name or next(iter(maps))]
 
 
-json_schema = partial(make_schema, _ColumnMaps, "ppafo column maps")
+json_schema = partial(record_schema, _ColumnMaps, "ppafo column maps")
 """JSON Schema of a file of column maps."""
 
 

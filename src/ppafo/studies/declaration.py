@@ -5,19 +5,18 @@ of a value.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
-from ppafo.model.declaration import Quantity
-from ppafo.parameters.declared import KIND, LABEL, SHORT_NAME, Field, Fields, Many, Words, inside, schema_of
+from ppafo.model.declaration import Number, Quantity
+from ppafo.parameters.declared import KIND, LABEL, SHORT_NAME, Fields, Many, Words
+from ppafo.parameters.records import SchemaVersion, keyed, record_schema
 from ppafo.simulation.scenario import LARGEST_SEED
+from ppafo.studies.study import Outputs, SamplingPlan
 
-MAXIMUM_RUNS = 2**32
-"""Largest number of draws: the period of a 32-bit Sobol sequence; no other method needs a lower limit."""
 MAXIMUM_RUNS_OF_CHUNK = 1_000_000
 """Largest number of runs of a chunk, whose rows stay in memory until written: about 100 MB for ten columns."""
-DEFAULT_SEED = 1
-"""Default random seed of the draws of a study."""
 MAXIMUM_GRID_VALUES = 1_000_000
 """Largest number of values of a grid axis; all of them are computed before the first run."""
 SAME_AS = "same_as"
@@ -97,45 +96,37 @@ def _vary(table: Mapping[str, Any]) -> Fields:
     }
 
 
-def declared(_document: Mapping[str, Any]) -> dict[str, Field]:
-    """Return every field of a study file, by path."""
-    texts = Words("", True)
-    configuration: Fields = {
-        "name": Words("label in tables and figures", True, pattern=LABEL),
-        "scenario": Words("name of a scenario, or a path relative to this file", True),
-        "overrides": Many(texts, "such as 'valve.area=12.6mm^2'"),
-    }
-    correlation: Fields = {
-        "between": Many(texts, "two paths that have distributions", True, 2, 2),
-        "coefficient": Quantity("", "", "1: both values at the same quantile", None, -1.0, 1.0, plain=True),
-    }
-    sample: Fields = {
-        "method": Words("how numbers are drawn", True, ("random", "latin_hypercube", "sobol")),
-        "runs": _whole("draws; each is run in every configuration", 1, MAXIMUM_RUNS, optional=False),
-        "seed": _SEED,
-    }
-    outputs: Fields = {
-        "metrics": Many(texts, "names of metrics, or 'all'", words=("all",)),
-        "trajectories": Many(texts, "channels kept for every run"),
-        "bands": Many(texts, "channels whose quantiles over all runs are kept"),
-        "errors": Words("estimated error of each metric from the steps, in five times the time", form=bool),
-        "every": Words("time between two kept samples; default 10 ms"),
-        "quantiles": Many(
-            Quantity("", "", "", None, 0.0, 1.0, plain=True), "of the bands; default 5, 25, 50, 75 and 95 %", least=1
-        ),
-    }
-    return {
-        "schema_version": Words("version of this layout", True, (1,)),
-        "name": Words(required=True, pattern=SHORT_NAME),
-        "description": Words("what this study asks, and why"),
-        "configurations": Many(lambda _: configuration, "each is run with the same draws", True, 1),
-        "vary": Many(_vary, "varied paths"),
-        "correlations": Many(lambda _: correlation, "of the normal scores of two distributions: a Gaussian copula"),
-        "runs_of_chunk": _whole("runs computed and written together", 1, MAXIMUM_RUNS_OF_CHUNK),
-        **inside("sample", sample, "for 'sweep': required if there are distributions"),
-        **inside("outputs", outputs, "for 'sweep': what is kept of each run"),
-    }
+@dataclass(frozen=True, slots=True)
+class ConfigurationSection:
+    """Section of a study file for one configuration: scenario and overrides; all configurations get the same draws."""
+
+    name: str = keyed(Words("label in tables and figures", pattern=LABEL))
+    scenario: str = keyed("name of a scenario, or a path relative to this file")
+    overrides: tuple[str, ...] = keyed("such as 'valve.area=12.6mm^2'", ())
 
 
-json_schema = partial(schema_of, "ppafo study", declared)
+@dataclass(frozen=True, slots=True)
+class Correlation:
+    """Correlation of two distributions: correlation coefficient of their normal scores (a Gaussian copula)."""
+
+    between: tuple[str, str] = keyed(Many(Words("", True), "two paths that have distributions", least=2, most=2))
+    coefficient: float = keyed(Number("", "1: both values at the same quantile", None, -1.0, 1.0, plain=True))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudyFile:
+    """Study file: configurations, varied paths, correlations, sampling and outputs."""
+
+    schema_version: SchemaVersion
+    name: str = keyed(Words(pattern=SHORT_NAME))
+    description: str = keyed("what this study asks, and why", "")
+    configurations: tuple[ConfigurationSection, ...] = keyed("each is run with the same draws")
+    vary: tuple[Mapping[str, Any], ...] = keyed(Many(_vary, "varied paths"), ())
+    correlations: tuple[Correlation, ...] = ()
+    runs_of_chunk: int | None = keyed(_whole("runs computed and written together", 1, MAXIMUM_RUNS_OF_CHUNK), None)
+    sample: SamplingPlan | None = keyed("for 'sweep': required if there are distributions", None)
+    outputs: Outputs = keyed("for 'sweep': what is kept of each run", Outputs())
+
+
+json_schema = partial(record_schema, StudyFile, "ppafo study")
 """JSON Schema of a study file."""

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ppafo.arguments import Count, Overrides, Seed, checked
-from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import (
     DataError,
@@ -25,15 +24,16 @@ from ppafo.errors import (
 )
 from ppafo.loading import load_scenario, placed
 from ppafo.metrics import METRICS
-from ppafo.parameters.declared import check_keys
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import other_forms, override_set, read_overrides
+from ppafo.parameters.records import checked_record
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import changes_in, chosen_path
-from ppafo.studies.declaration import DEFAULT_SEED, NOT_RANDOM, SAME_AS, declared
+from ppafo.studies.declaration import NOT_RANDOM, SAME_AS, ConfigurationSection, Correlation, StudyFile
 from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, with_noise
 from ppafo.studies.study import (
+    DEFAULT_SEED,
     NO_SAMPLE,
     Axis,
     Configuration,
@@ -159,42 +159,41 @@ def _load(
         # Files omit the kind of a table with the key `same_as`.
         if isinstance(table, dict) and SAME_AS in table:
             table.setdefault("kind", SAME_AS)
-    text = decoded(source.text)
-    check_keys(document, declared(document), source.file, StudyError, text)
+    parsed = checked_record(StudyFile, document, source.file, StudyError, source.text)
     sampling = {key: value for key, value in (("runs", draws), ("seed", seed)) if value is not None}
     with refused_as(StudyError, source.file, StudyError):
         if changes:
-            unchanged = [_configuration(section, source.folder) for section in document["configurations"]]
+            unchanged = [_configuration(section, source.folder) for section in parsed.configurations]
             changed = configurations_with(unchanged, changes)
             for table, configuration in zip(document["configurations"], changed, strict=True):
                 table["overrides"] = list(configuration.scenario.origin.overrides)
-        if sampling and "sample" not in document:
-            is_random = any(entry["kind"] not in NOT_RANDOM for entry in document.get("vary", ()))
+        if sampling and parsed.sample is None:
+            is_random = any(entry["kind"] not in NOT_RANDOM for entry in parsed.vary)
             raise StudyError(
                 NO_SAMPLE if is_random else "has no [sample], so the runs are not random; omit draws and seed"
             )
-    if sampling:
-        document["sample"] |= sampling
-        check_keys(document, declared(document), source.file, StudyError, text)
+        if sampling:
+            document["sample"] |= sampling
+    parsed = checked_record(StudyFile, document, source.file, StudyError, source.text)
     with refused_as(StudyError, source.file, StudyError):
-        return _build(document, source, changes)
+        return _build(parsed, document, source, changes)
 
 
-def _build(document: dict[str, Any], source: _StudySource, changes: tuple[str, ...]) -> Study:
-    """Build the study of a checked document in SI units; StudyError with all mistakes that stand in it."""
-    sections, vary, kept = document["configurations"], document.get("vary", ()), document.get("outputs", {})
-    wrong, configurations, paths = list[PpafoError](), list[Configuration](), [entry["path"] for entry in vary]
+def _build(parsed: StudyFile, document: dict[str, Any], source: _StudySource, changes: tuple[str, ...]) -> Study:
+    """Build the study of a parsed study file in SI units; StudyError with all mistakes that stand in the file."""
+    wrong, configurations, vary = list[PpafoError](), list[Configuration](), parsed.vary
+    sections, paths = parsed.configurations, [entry["path"] for entry in parsed.vary]
     for section in sections:
         with noted_in(wrong):
             configurations.append(_configuration(section, source.folder))
-    if (repeated := first_twice([section["name"] for section in sections])) is not None:
+    if (repeated := first_twice([section.name for section in sections])) is not None:
         wrong.append(
             StudyError(f"two configurations are named '{repeated}'; give every configuration a different name")
         )
     if not paths and len(sections) == 1:
         wrong.append(StudyError("varies nothing: give at least one [[vary]] or a second configuration"))
     # Rows of channels over time are lists of one length, and bands are quantiles at one time.
-    if "run.duration" in paths and (kept.get("trajectories") or kept.get("bands")):
+    if "run.duration" in paths and parsed.outputs.traces:
         said = "'run.duration' cannot vary with trajectories or bands, which need runs of equal length"
         wrong.append(StudyError(said))
     if (repeated := first_twice(paths)) is not None:
@@ -217,14 +216,14 @@ def _build(document: dict[str, Any], source: _StudySource, changes: tuple[str, .
     drawn, scores, sample = tuple(each for each in independent if isinstance(each, RandomValue)), None, None
     random = [entry["path"] for entry in vary if entry["kind"] not in NOT_RANDOM]
     with noted_in(wrong):
-        scores = _scores(document.get("correlations", ()), random)
+        scores = _scores(parsed.correlations, random)
     with noted_in(wrong):
-        outputs = valid_outputs(kept, scenarios)
+        outputs = valid_outputs(parsed.outputs, scenarios)
     # A grid alone is run once, with the noise that its scenarios write.
     if drawn and not wrong:
         drawn, scores = with_noise(drawn, scores, scenarios, paths)
     with noted_in(wrong):
-        sample = _sample(document.get("sample"), drawn or random)
+        sample = _sample(parsed.sample, drawn or random)
     raise_noted(wrong)
     assert outputs is not None and sample is not None, "else refused above"  # noqa: PT018 - both or neither
     # The noise, which has no [[vary]] table, is a plain number.
@@ -233,8 +232,8 @@ def _build(document: dict[str, Any], source: _StudySource, changes: tuple[str, .
     # What follows a gauge pressure counts from the atmosphere of its run as well.
     gauge = {path for path, varied in varied_paths.items() if varied.is_gauge}
     return Study(
-        name=document["name"],
-        description=" ".join(document.get("description", "").split()),
+        name=parsed.name,
+        description=" ".join(parsed.description.split()),
         configurations=tuple(configurations),
         axes=tuple(axis for axis in independent if isinstance(axis, Axis)),
         drawn=drawn,
@@ -242,22 +241,21 @@ def _build(document: dict[str, Any], source: _StudySource, changes: tuple[str, .
         scores=scores,
         sample=sample,
         outputs=outputs,
-        runs_of_chunk=document.get("runs_of_chunk"),
+        runs_of_chunk=parsed.runs_of_chunk,
         units=plain | {path: varied.quantity.unit or "-" for path, varied in varied_paths.items()},
         given={path: unit for path, unit in given.items() if unit != shown_unit(varied_paths[path].quantity.unit, {})},
         gauge=frozenset(gauge | {path for path, other in followed.items() if other in gauge}),
-        only={entry["path"]: tuple(entry["only"]) for entry in vary if entry.get("only")},
+        only={entry["path"]: entry["only"] for entry in vary if entry.get("only")},
         document=document,
         text=source.text,
         changes=changes_in(*scenarios, overrides=changes),
     )
 
 
-def _configuration(section: Mapping[str, Any], folder: Path) -> Configuration:
+def _configuration(section: ConfigurationSection, folder: Path) -> Configuration:
     """Load the scenario of a configuration section, with its overrides."""
-    name = section["name"]
-    with refused_as(StudyError, f"configuration '{name}'", ScenarioError, ParameterError, DataError):
-        return Configuration(name, load_scenario(placed(section["scenario"], folder), section.get("overrides", ())))
+    with refused_as(StudyError, f"configuration '{section.name}'", ScenarioError, ParameterError, DataError):
+        return Configuration(section.name, load_scenario(placed(section.scenario, folder), section.overrides))
 
 
 def _varied(
@@ -289,9 +287,9 @@ def _varied(
         return varied, RandomValue(path, replace(stated[0][0], zero=zero))
 
 
-def _check_not_set(entry: Mapping[str, Any], section: Mapping[str, Any], configuration: Configuration) -> None:
+def _check_not_set(entry: Mapping[str, Any], section: ConfigurationSection, configuration: Configuration) -> None:
     """Raise StudyError for a path that is both set and varied in a configuration, in any form (area, conductance)."""
-    overrides = read_overrides(section.get("overrides", ()), StudyError)
+    overrides = read_overrides(section.overrides, StudyError)
     path, only = chosen_path(entry["path"], configuration.scenario), entry.get("only")
     set_values = override_set(overrides, StudyError, valve=configuration.scenario.device.valve_name)
     # The varied column replaces the value in every run, whichever form of it is set.
@@ -317,21 +315,21 @@ def _check_followed(path: str, other: str, independent: Sequence[str], varied: M
         raise StudyError(f"{said} has the unit '{units[1]}', but '{path}' has '{units[0]}'; both need the same unit")
 
 
-def _scores(correlations: Sequence[Mapping[str, Any]], paths: Sequence[str]) -> Factor | None:
+def _scores(correlations: Sequence[Correlation], paths: Sequence[str]) -> Factor | None:
     """Return the lower Cholesky factor of the correlation of the normal scores; None without correlations."""
     if not correlations:
         return None
     coefficients: dict[tuple[str, str], float] = {}
     for pair in correlations:
-        first, other = pair["between"]
-        for path in pair["between"]:
+        first, other = pair.between
+        for path in pair.between:
             if path not in paths:
                 raise StudyError(f"correlations: '{path}' has no distribution{known_names(path, paths)}")
         if first == other or (first, other) in coefficients or (other, first) in coefficients:
             raise StudyError(
                 f"correlations: between = ['{first}', '{other}'] must name two different paths, and each pair only once"
             )
-        coefficients[first, other] = min(max(pair["coefficient"], -_CLOSEST), _CLOSEST)
+        coefficients[first, other] = min(max(pair.coefficient, -_CLOSEST), _CLOSEST)
     matrix = np.eye(len(paths))
     for (first, other), coefficient in coefficients.items():
         row, column = paths.index(first), paths.index(other)
@@ -345,16 +343,14 @@ def _scores(correlations: Sequence[Mapping[str, Any]], paths: Sequence[str]) -> 
     return factor
 
 
-def _sample(section: Mapping[str, Any] | None, drawn: Sequence[object]) -> SamplingPlan:
+def _sample(plan: SamplingPlan | None, drawn: Sequence[object]) -> SamplingPlan:
     """Return the sampling plan of the distributions; without distributions, one run at each point of the grid."""
     if not drawn:
-        if section is not None:
+        if plan is not None:
             raise StudyError("[sample] is given, but no value has a distribution; omit [sample]")
         return SamplingPlan(None, 1, 0)
-    # Enough where something else draws, such as a sensitivity analysis.
-    if section is None:
-        return SamplingPlan(None, 1, DEFAULT_SEED)
     # The direction numbers of SciPy's sequence end there.
-    if section["method"] == "sobol" and len(drawn) > MAXIMUM_SOBOL_DIMENSIONS:
+    if plan is not None and plan.method == "sobol" and len(drawn) > MAXIMUM_SOBOL_DIMENSIONS:
         raise StudyError(f"sample.method = 'sobol' allows at most {MAXIMUM_SOBOL_DIMENSIONS} distributions")
-    return SamplingPlan(section["method"], section["runs"], section.get("seed", DEFAULT_SEED))
+    # Enough where something else draws, such as a sensitivity analysis.
+    return plan or SamplingPlan(None, 1, DEFAULT_SEED)

@@ -9,37 +9,38 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ppafo.engine.channels import TRACED
-from ppafo.errors import PpafoError, StudyError, UnitError, at_fault, refused_as
+from ppafo.errors import PpafoError, StudyError, at_fault, refused_as
 from ppafo.loading import reloaded, scenario_or_load
 from ppafo.metrics import METRICS
 from ppafo.model.controlled import CONTROLLED
+from ppafo.model.declaration import Number, Quantity
+from ppafo.parameters.declared import Many, Words
 from ppafo.parameters.parameter_set import PATHS_THAT_SET_UNITS, chosen_units
+from ppafo.parameters.records import keyed
 from ppafo.simulation.ensemble.running import lacking, offered
 from ppafo.simulation.numbers import changes_in
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.studies.distributions import Distribution
-from ppafo.units import parse_quantity
 from ppafo.wording import first_twice, known_names
 
-_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-"""Default quantiles: the central 90 % of the runs, the central 50 %, and the median."""
+MAXIMUM_RUNS = 2**32
+"""Largest number of draws: the period of a 32-bit Sobol sequence; no other method needs a lower limit."""
+DEFAULT_SEED = 1
+"""Default random seed of the draws of a study."""
+_QUANTILES = Many(Quantity("", "", "", None, 0.0, 1.0, plain=True), "of the bands; from 0 to 1", least=1)
+_METRICS = Many(Words("", True), "names of metrics, or 'all'", words=("all",))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Outputs:
-    """Outputs of a study that are kept of every run.
+    """Outputs of a study that are kept of every run: metrics, channels of every run, and channels as quantile bands."""
 
-    ``metrics`` are the names of metrics, ``trajectories`` the channels kept for every run, ``bands`` the channels kept
-    as quantile bands; ``every`` is the time between two samples [s], ``quantiles`` are from 0 to 1. ``errors`` is true
-    if the estimated error of each metric is kept as well.
-    """
-
-    metrics: tuple[str, ...]
-    trajectories: tuple[str, ...]
-    bands: tuple[str, ...]
-    every: float
-    quantiles: tuple[float, ...]
-    errors: bool = False
+    metrics: tuple[str, ...] = keyed(_METRICS, ())
+    trajectories: tuple[str, ...] = keyed("channels kept for every run", ())
+    bands: tuple[str, ...] = keyed("channels whose quantiles over all runs are kept", ())
+    errors: bool = keyed("estimated error of each metric from the steps, in five times the time", False)
+    every: float = keyed(Number("s", "time between two kept samples", minimum=0.0, minimum_allowed=False), 0.01)
+    quantiles: tuple[float, ...] = keyed(_QUANTILES, (0.05, 0.25, 0.5, 0.75, 0.95))
 
     @property
     def traces(self) -> tuple[str, ...]:
@@ -47,16 +48,16 @@ class Outputs:
         return tuple(dict.fromkeys((*self.trajectories, *self.bands)))
 
 
-def valid_outputs(section: Mapping[str, Any], scenarios: Sequence[Scenario]) -> Outputs:
-    """Check the section of outputs of a study, and convert it to SI; StudyError for an unknown metric or channel."""
-    asked, trajectories, bands = (tuple(section.get(key, ())) for key in ("metrics", "trajectories", "bands"))
-    has_all, typed = section.get("metrics") == "all", section.get("every", "10 ms")
-    metrics = tuple(METRICS) if has_all else asked
+def valid_outputs(asked: Outputs, scenarios: Sequence[Scenario]) -> Outputs:
+    """Return the outputs of a study file with the metrics that some scenario has; StudyError for an unknown name."""
+    # The word 'all' stands in the place of the names.
+    has_all = str(asked.metrics) == "all"
+    metrics = tuple(METRICS) if has_all else asked.metrics
     apply = dict.fromkeys(name for scenario in scenarios for name in offered(scenario))
     requests = (
         ("metrics", "metric", metrics, METRICS, apply),
-        ("trajectories", "channel", trajectories, TRACED, TRACED),
-        ("bands", "channel", bands, TRACED, TRACED),
+        ("trajectories", "channel", asked.trajectories, TRACED, TRACED),
+        ("bands", "channel", asked.bands, TRACED, TRACED),
     )
     for key, noun, names, known, shown in requests:
         for name in names:
@@ -64,7 +65,7 @@ def valid_outputs(section: Mapping[str, Any], scenarios: Sequence[Scenario]) -> 
                 raise StudyError(f"outputs.{key}: there is no {noun} '{name}'{known_names(name, shown or known)}")
         if (repeated := first_twice(names)) is not None:
             raise StudyError(f"outputs.{key}: '{repeated}' is named twice; name it once")
-    channels = (*trajectories, *bands)
+    channels = (*asked.trajectories, *asked.bands)
     controlled = {each.controlled for each in scenarios if not each.controller.is_open_loop}
     for name, kind in CONTROLLED.items():
         if kind.reference in channels and name not in controlled:
@@ -77,19 +78,11 @@ def valid_outputs(section: Mapping[str, Any], scenarios: Sequence[Scenario]) -> 
     if missing and not has_all:
         name, reason = next(iter(missing.items()))
         raise StudyError(f"outputs: no scenario has '{name}': {reason}")
-    with refused_as(StudyError, f"outputs.every = {typed!r}", UnitError):
-        every = parse_quantity(typed, "s")
     shortest = min(scenario.run.duration for scenario in scenarios)
-    if channels and not 0.0 < every <= shortest:
-        raise StudyError(f"outputs.every = {typed!r} must be above 0 s and at most run.duration = {shortest:g} s")
-    return Outputs(
-        metrics=tuple(name for name in metrics if name not in missing),
-        trajectories=trajectories,
-        bands=bands,
-        every=every,
-        quantiles=tuple(sorted(set(map(float, section.get("quantiles", _QUANTILES))))),
-        errors=section.get("errors", False),
-    )
+    if channels and asked.every > shortest:
+        raise StudyError(f"outputs.every = {asked.every:g} s must be at most run.duration = {shortest:g} s")
+    kept = tuple(name for name in metrics if name not in missing)
+    return replace(asked, metrics=kept, quantiles=tuple(sorted(set(map(float, asked.quantiles)))))
 
 
 SamplingMethod = Literal["random", "latin_hypercube", "sobol"]
@@ -123,9 +116,11 @@ class RandomValue:
 class SamplingPlan:
     """Sampling plan: method, number of draws and seed; one draw without a method if there are no distributions."""
 
-    method: SamplingMethod | None
-    runs: int
-    seed: int
+    method: SamplingMethod | None = keyed("how numbers are drawn")
+    runs: int = keyed(
+        Number("", "draws; each is run in every configuration", minimum=1, maximum=MAXIMUM_RUNS, whole=True)
+    )
+    seed: int = keyed(Number("", "", minimum=0, maximum=LARGEST_SEED, whole=True), DEFAULT_SEED)
 
 
 NO_SAMPLE = "'sample' is missing: distributions need [sample] with method and runs"

@@ -113,7 +113,7 @@ def test_a_claim_is_missed_only_outside_its_window(reproduction: Reproduction) -
     values = {1.0: False, 1.2: False, 0.99: True, 1.21: True, None: True}
     for value, is_missed in values.items():
         assert dataclasses.replace(claim, value=value).is_missed is is_missed
-    half = claim.entry.model_copy(update={"at_most": None})
+    half = replace(claim.entry, at_most=None)
     assert dataclasses.replace(claim, value=2.0, entry=half).is_missed is False
 
 

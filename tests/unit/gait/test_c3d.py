@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -112,7 +113,7 @@ def test_a_walk_the_other_way_is_seen_in_the_markers_and_a_map_may_name_axes_and
     assert same(seen.gait, normative)
     assert knee_error(seen.gait, normative) < 0.15
     assert "walking direction is -x, upwards is z" in seen.remarks
-    forwards = columns.model_copy(update={"shank_angle": ShankMap(knee="RKNE", ankle="RANK", forward="x")})
+    forwards = replace(columns, shank_angle=ShankMap(knee="RKNE", ankle="RANK", forward="x"))
     with pytest.raises(DataError, match="forward = 'x' is reversed: 'RANK' travels against it; the axis is '-x'"):
         import_gait([path], ImportSettings(normative.body_mass, columns=forwards))
 

@@ -135,7 +135,7 @@ def test_the_knee_is_read_as_acceleration_as_position_or_from_the_hip(
             KneeMap(forward=("hip_x",), up=("hip_y",), thigh=("thigh",), thigh_length="40 cm"),
         ),
     }[how]
-    columns_map = package_map().model_copy(update={"knee": knee, "centre_of_pressure": None})
+    columns_map = replace(package_map(), knee=knee, centre_of_pressure=None)
     found = import_gait([csv_of(files)], ImportSettings(62.0, columns=columns_map)).gait
     for name in KNEE:
         assert largest_difference(found, normative, name) < KNEE_LIMIT
@@ -209,7 +209,7 @@ def test_a_knee_that_cannot_be_worked_out_is_refused(
     csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording, knee: dict[str, Any], message: str
 ) -> None:
     mapped = KneeMap(forward=("knee_forward",), up=("knee_up",), **{"unit": "m", **knee})
-    columns_map = package_map().model_copy(update={"knee": mapped, "centre_of_pressure": None})
+    columns_map = replace(package_map(), knee=mapped, centre_of_pressure=None)
     path = csv_of({**columns, "thigh [rad]": 0.3 * np.cos(6.0 * walk.time)})
     with pytest.raises(DataError, match=re.escape(message)):
         import_gait([path], ImportSettings(62.0, columns=columns_map))

@@ -15,6 +15,7 @@ from ppafo.identification.source import RecordingSource
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.parameters.loading import load_parameter_set
 from ppafo.parameters.parameter_set import Entry
+from ppafo.parameters.records import record_from
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
 
@@ -147,7 +148,7 @@ def of_law(kind: str, sources: Sources, tolerances: Tolerances, numbers: Numbers
     )
     given = {name: value for name, value in keys.items() if value is not None}
     sources = tuple(replace(source, user=kind) for source in sources)
-    return LAWS[kind].model_validate({"kind": kind, "recordings": ["a.csv"], **given}).run(sources, context)
+    return record_from(LAWS[kind], {"kind": kind, "recordings": ["a.csv"], **given}).run(sources, context)
 
 
 def in_gas(kind: str, sources: Sources, gas: GasAt, tolerances: Tolerances, more: Numbers, **keys: Any) -> BenchResult:
@@ -157,7 +158,7 @@ def in_gas(kind: str, sources: Sources, gas: GasAt, tolerances: Tolerances, more
         "gas.heat_capacity_ratio": (gas.heat_capacity_ratio, ""),
         "gas.temperature": (gas.temperature, "K"),
     }
-    tolerances = tolerances.model_copy(update={"gas_temperature": math.sqrt(3.0) * gas.temperature_deviation})
+    tolerances = replace(tolerances, gas_temperature=math.sqrt(3.0) * gas.temperature_deviation)
     return of_law(kind, sources, tolerances, numbers | more, **keys)
 
 

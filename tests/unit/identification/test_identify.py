@@ -445,9 +445,7 @@ def test_bench_and_trajectory_hold_a_number_alike() -> None:
     scenario = load_scenario("step-response", ["motion.kind=free"])
     experiment = FittedExperiment("step", scenario, simulate(scenario).recording)
     stated = stated_by(chosen.parameter_set, scenario)
-    held = {
-        one.path: one.deviation for one in tolerance_parameters(Tolerances.model_construct(), (experiment,), (), stated)
-    }
+    held = {one.path: one.deviation for one in tolerance_parameters(Tolerances(), (experiment,), (), stated)}
     leak = VaneLeakProblem(kind="vane-leak", recordings=("leak.csv",), angle="60 deg")
     decay = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",))
     told = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",), inertia="8.4 g m^2")

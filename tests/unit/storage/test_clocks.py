@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError
+from ppafo.parameters.records import record_from
 from ppafo.storage.clock import clock_seconds, counted_on
 from ppafo.storage.column_map import ColumnMap
 from ppafo.storage.foreign import read_foreign
@@ -115,7 +116,7 @@ def read(folder: Path, text: str, time: dict[str, Any], **keys: Any) -> Any:
     path = folder / "log.txt"
     path.write_text(text, encoding="utf-8")
     channels = {"time": time, "torque": keys.pop("torque", {"column": "M", "unit": "Nm"})}
-    return read_foreign(path, ColumnMap.model_validate({"channels": channels, **keys}))
+    return read_foreign(path, record_from(ColumnMap, {"channels": channels, **keys}))
 
 
 def test_a_date_and_a_time_in_two_columns(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import ppafo
 from ppafo.errors import DataError
+from ppafo.parameters.records import record_from
 from ppafo.storage.column_map import ColumnMap, load_column_map
 from ppafo.storage.foreign import read_foreign, read_trials
 from tests.repeatable import TOO_SLOW
@@ -20,7 +21,7 @@ TIME = {"column": 1, "unit": "ms"}
 
 def mapped(**keys: Any) -> ColumnMap:
     channels = {"time": TIME, **keys.pop("channels", {})}
-    return ColumnMap.model_validate({"header": False, "channels": channels, **keys})
+    return record_from(ColumnMap, {"header": False, "channels": channels, **keys})
 
 
 def written(folder: Path, text: str | bytes) -> Path:
@@ -53,8 +54,8 @@ def test_gauge_pressure_counts_from_the_atmosphere_that_is_given(tmp_path: Path)
 def test_decimal_commas_semicolons_and_names_are_read(tmp_path: Path) -> None:
     text = "exported by hand\nZeit;Kraft\n0,0;1,5\n1,0;-2,25\n"
     channels = {"time": {"column": "Zeit", "unit": "s"}, "torque": {"column": "Kraft", "unit": "N m"}}
-    columns = ColumnMap.model_validate(
-        {"delimiter": "semicolon", "decimal": "comma", "skip_lines": 1, "channels": channels}
+    columns = record_from(
+        ColumnMap, {"delimiter": "semicolon", "decimal": "comma", "skip_lines": 1, "channels": channels}
     )
     assert np.allclose(read_foreign(written(tmp_path, text), columns)["torque"], [1.5, -2.25])
 
@@ -227,14 +228,15 @@ def test_a_column_map_says_what_a_channel_does_between_its_samples(tmp_path: Pat
     (tmp_path / "log.csv").write_text("t,u,p\n0,0,4\n1,1,5\n2,0,6\n")
     found = read_foreign(
         tmp_path / "log.csv",
-        ColumnMap.model_validate(
+        record_from(
+            ColumnMap,
             {
                 "channels": {
                     "time": {"column": "t", "unit": "s"},
                     "command": {"column": "u", "between": "linear"},
                     "supply_pressure": {"column": "p", "unit": "bar_a", "between": "hold"},
                 }
-            }
+            },
         ),
     ).resample([0.5])
     assert found["command"].tolist() == [0.5]
@@ -244,7 +246,7 @@ def test_a_column_map_says_what_a_channel_does_between_its_samples(tmp_path: Pat
 def test_a_file_in_utf_16_is_read(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("t,Öffnung\n0,1\n1,0\n", encoding="utf-16")
     channels = {"time": {"column": "t", "unit": "s"}, "command": {"column": "Öffnung"}}
-    assert read_foreign(tmp_path / "log.csv", ColumnMap.model_validate({"channels": channels}))["command"][0] == 1.0
+    assert read_foreign(tmp_path / "log.csv", record_from(ColumnMap, {"channels": channels}))["command"][0] == 1.0
 
 
 def test_a_foreign_log_is_measured_and_read_through_a_map_by_name(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 import scipy.io
 
 from ppafo.errors import DataError
+from ppafo.parameters.records import record_from
 from ppafo.storage.column_map import ColumnMap
 from ppafo.storage.foreign import read_foreign
 from ppafo.storage.matlab import open_matlab, read_matlab
@@ -38,7 +39,7 @@ X_Value\tDruck\tDruck_0\tComment
 
 
 def columns(channels: dict[str, Any], **keys: Any) -> ColumnMap:
-    return ColumnMap.model_validate({"channels": channels, **keys})
+    return record_from(ColumnMap, {"channels": channels, **keys})
 
 
 def written(folder: Path, name: str, content: str | bytes) -> Path:

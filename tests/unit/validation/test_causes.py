@@ -431,7 +431,7 @@ def test_a_chamber_that_rises_by_more_than_a_usual_zero_does_not_agree(filling: 
 
 
 def test_what_is_usual_on_a_bench_is_the_same_for_limits_causes_and_the_fit() -> None:
-    usual, device = Tolerances.model_construct(), load_device("ppafo2011", overrides=SUPPLY)
+    usual, device = Tolerances(), load_device("ppafo2011", overrides=SUPPLY)
     by_name = {cause.name: cause.usual for cause in of_sensors(device, ["angle", "pressure_1", "pressure_2"], {})}
     for channel in ("angle", "pressure_1"):
         assert by_name[f"zero of {channel}"] == usual.zero_of(channel) == COMPARED[channel].usual_zero(device)

@@ -7,17 +7,15 @@ from fractions import Fraction
 from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from ppafo.arguments import checked
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.profiles import KNOTS
-from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema, validate
-from ppafo.documents.toml_text import NAME, TomlKind, beside, label
+from ppafo.documents.toml_text import TomlKind, beside, label
 from ppafo.errors import (
     DataError,
     ParameterError,
@@ -32,7 +30,10 @@ from ppafo.errors import (
 from ppafo.gait import load_gait
 from ppafo.gait.gait import BODY_MASSES
 from ppafo.loading import reloaded
+from ppafo.model.declaration import Number, Quantity
 from ppafo.parameters.bottles.bottle import Bottle, load_bottle
+from ppafo.parameters.declared import SHORT_NAME, Many, Words
+from ppafo.parameters.records import SchemaVersion, checked_record, keyed, record_schema
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.signals.recording import Floats
 from ppafo.simulation.loading import load_scenario
@@ -56,17 +57,17 @@ _MOMENT = 1.0e-5
 """Duration [s] of the torque step between two repetitions if the end differs from the start."""
 
 
-class ProfileSection(StrictTable):
+@dataclass(frozen=True, slots=True)
+class ProfileSection:
     """Section of a sizing file: torque over one repetition, from a recording or as times and torques."""
 
-    recording: Annotated[
-        str | None,
-        Field(description=f"a .csv or .nc file or a result folder, relative to this file; or '{FROM_GAIT}'"),
-    ] = None
-    channel: Annotated[Text, Field(description="channel of the recording, in N m")] = "torque"
-    time: Annotated[Texts, Field(description="times with unit, from 0 on; the profile repeats after the last")] = ()
-    torque: Annotated[Texts, Field(description="torques with unit, one for each time")] = ()
-    scale: Annotated[float, Field(description="factor on every torque: the fraction that the orthosis provides")] = 1.0
+    recording: str | None = keyed(
+        f"a .csv or .nc file or a result folder, relative to this file; or '{FROM_GAIT}'", None
+    )
+    channel: str = keyed("channel of the recording, in N m", "torque")
+    time: tuple[str, ...] = keyed("times with unit, from 0 on; the profile repeats after the last", ())
+    torque: tuple[str, ...] = keyed("torques with unit, one for each time", ())
+    scale: float = keyed("factor on every torque: the fraction that the orthosis provides", 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -211,67 +212,68 @@ def _profile_of_table(table: ProfileSection, where: str) -> tuple[Floats, Floats
     return time, table.scale * torque
 
 
-_Factor = Annotated[float, Field(ge=0.0, le=1000.0)]
 _SECONDS_PER_HOUR = 3600.0
 _LARGEST_DENOMINATOR = 10**6
+_FACTORS = Many(
+    Quantity("", "", "", None, 0.0, 1000.0, plain=True),
+    "factors by which each gain of the controller is multiplied",
+    least=1,
+    most=12,
+)
 
 
-class UseTable(StrictTable):
+@dataclass(frozen=True, slots=True)
+class UseTable:
     """Section of a sizing file: use on one bottle, as repetitions or hours, with a reserve."""
 
-    repetitions: Annotated[
-        int | None, Field(gt=0, description="number of repetitions of the profile, such as steps")
-    ] = None
-    hours: Annotated[float | None, Field(gt=0.0, description="hours of continuous use, instead of repetitions")] = None
-    reserve: Annotated[
-        float, Field(ge=0.0, le=10.0, description="gas to be left in the bottle, as a fraction of the gas used")
-    ] = 0.1
+    repetitions: int | None = keyed(
+        Number("", "number of repetitions of the profile, such as steps", minimum=1, whole=True), None
+    )
+    hours: float | None = keyed(
+        Number("", "hours of continuous use, instead of repetitions", minimum=0.0, minimum_allowed=False, plain=True),
+        None,
+    )
+    reserve: float = keyed(
+        Number("", "gas to be left in the bottle, as a fraction of the gas used", None, 0.0, 10.0, plain=True), 0.1
+    )
 
 
-class LimitsTable(StrictTable):
+@dataclass(frozen=True, slots=True)
+class LimitsTable:
     """Section of a sizing file: limit of the RMS torque error."""
 
-    rms_error: Annotated[Text, Field(description="largest RMS torque error: '0.5 N m', or '5 %' of the largest torque")]
+    rms_error: str = keyed("largest RMS torque error: '0.5 N m', or '5 %' of the largest torque")
 
 
-class PressureTable(StrictTable):
+@dataclass(frozen=True, slots=True)
+class PressureTable:
     """Section of a sizing file: range of supply pressures; both regulators have the same pressure."""
 
-    lowest: Annotated[Text, Field(description="lowest supply pressure")] = "10 psi_g"
-    highest: Annotated[Text, Field(description="highest supply pressure")] = "120 psi_g"
+    lowest: str = keyed("lowest supply pressure", "10 psi_g")
+    highest: str = keyed("highest supply pressure", "120 psi_g")
 
 
-class SizingFile(StrictTable):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SizingFile:
     """Sizing file: design of a device that follows a torque profile."""
 
     schema_version: SchemaVersion
-    name: Annotated[str, Field(pattern=NAME, max_length=100)]
+    name: str = keyed(Words(pattern=SHORT_NAME))
     description: str = ""
-    scenario: Annotated[Text, Field(description="device, motion, controller and sensors: a name, or a path")]
-    overrides: Annotated[Texts, Field(description="changes to the scenario")] = ()
-    bottles: Annotated[
-        Texts, Field(min_length=1, description="bottles to choose from: names, or paths relative to this file")
-    ]
+    scenario: str = keyed("device, motion, controller and sensors: a name, or a path")
+    overrides: tuple[str, ...] = keyed("changes to the scenario", ())
+    bottles: tuple[str, ...] = keyed("bottles to choose from: names, or paths relative to this file")
     profile: ProfileSection
     use: UseTable
     limits: LimitsTable
-    valves: Annotated[
-        dict[str, dict[str, Text]],
-        Field(min_length=1, description="valves to choose from: by name, the values that the scenario's valve lacks"),
-    ]
+    valves: dict[str, dict[str, str]] = keyed(
+        "valves to choose from: by name, the values that the scenario's valve lacks"
+    )
     pressure: PressureTable = PressureTable()
-    gain_factors: Annotated[
-        tuple[_Factor, ...],
-        Field(
-            strict=False,
-            min_length=1,
-            max_length=12,
-            description="factors by which each gain of the controller is multiplied",
-        ),
-    ] = (0.0, 0.5, 1.0, 3.0, 8.0)
-    simulated: Annotated[
-        int, Field(ge=1, le=1000, description="repetitions to simulate; the first fills the lines")
-    ] = 3
+    gain_factors: tuple[float, ...] = keyed(_FACTORS, (0.0, 0.5, 1.0, 3.0, 8.0))
+    simulated: int = keyed(
+        Number("", "repetitions to simulate; the first fills the lines", None, 1, 1000, whole=True), 3
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -347,7 +349,7 @@ def load_design(problem: str | Path, *, profile: str | Path | None = None, plugi
     file, folder = label(str(problem)), Path(problem).parent
     with at_fault("problem"):
         content = FILE.read(problem)
-    document = validate(SizingFile, FILE.parse(content, file), file, StudyError, content)
+    document = checked_record(SizingFile, FILE.parse(content, file), file, StudyError, content)
     wrong, valves, bottles = list[PpafoError](), list[CandidateValve](), list[Bottle]()
     atmosphere, largest, pressures = STANDARD_ATMOSPHERE, 1.0, []
     with noted_in(wrong):
@@ -423,10 +425,10 @@ def load_design(problem: str | Path, *, profile: str | Path | None = None, plugi
         lowest_pressure=pressures[0],
         highest_pressure=pressures[1],
         gains=gains,
-        gain_factors=tuple(sorted(set(document.gain_factors))) if gains else (1.0,),
+        gain_factors=tuple(sorted(set(map(float, document.gain_factors)))) if gains else (1.0,),
         asked_profile=str(profile or ""),
     )
 
 
-json_schema = partial(make_schema, SizingFile, "ppafo design")
+json_schema = partial(record_schema, SizingFile, "ppafo design")
 """JSON Schema of a design file."""

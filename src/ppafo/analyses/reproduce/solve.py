@@ -30,6 +30,7 @@ from ppafo.parameters.overrides import Override, override_set, read_overrides, w
 from ppafo.parameters.parameter_set import SOURCE as OVERRIDE
 from ppafo.parameters.parameter_set import entry_text, with_followers
 from ppafo.parameters.publications.publication import paper_entries
+from ppafo.parameters.records import record_from
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.rig import record
 from ppafo.signals import Recording
@@ -270,9 +271,9 @@ def bench_figure() -> tuple[BenchResult, BenchResult]:
     planted, inertia = load_parameter_set(PLANTED_SET), "foot_plate.inertia"
     # The inertia is exact, and nothing is known of the friction.
     known = replace(planted, numbers={inertia: planted.numbers[inertia]})
-    context, results = BenchContext(known, "", "figure 3", Tolerances.model_construct(held=0.0)), list[BenchResult]()
+    context, results = BenchContext(known, "", "figure 3", Tolerances(held=0.0)), list[BenchResult]()
     for kind in ("static-torque", "free-decay"):
         source = RecordingSource(record(kind, BENCH_PRESET, RIG_SEED, PLANTED_SET).recording, user=kind)
-        table = LAWS[kind].model_validate({"kind": kind, "recordings": [source.name]})
+        table = record_from(LAWS[kind], {"kind": kind, "recordings": [source.name]})
         results.append(table.run((source,), context))
     return results[0], results[1]

@@ -5,37 +5,34 @@ subtracts the column.
 """
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
-
-from ppafo.documents.models import SchemaVersion, StrictTable, Text, make_schema, read_model
 from ppafo.documents.toml_text import NAME, TomlKind
 from ppafo.errors import DataError, UnitError, raise_noted, refused_as
 from ppafo.gait.gait import BODY_MASSES, SPEEDS, STATURES
 from ppafo.gait.recorded.table import LONGEST_FILLED
+from ppafo.parameters.declared import Many, Words
+from ppafo.parameters.records import SchemaVersion, keyed, read_record, record_schema
 from ppafo.units import parse_quantity
 from ppafo.wording import argument_text
 
 _FILE = TomlKind("gait map", "gait-map", resources.files("ppafo.gait.recorded"), DataError)
-_Terms = Annotated[
-    tuple[Text, ...], Field(strict=False, min_length=1, description="columns to add; '-' before one subtracts it")
-]
-_Unit = Annotated[Text | None, Field(description="unit of the columns, where the file does not state it")]
+_Terms = Annotated[tuple[str, ...], Many(Words("", True), "columns to add; '-' before one subtracts it", least=1)]
+_Unit = Annotated[str | None, Words("unit of the columns, where the file does not state it")]
 Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 Vertical = Literal["x", "y", "z"]
 _Flexion = Literal["plantarflexion", "dorsiflexion"]
 
 
-class FrameClock(StrictTable):
+@dataclass(frozen=True, slots=True)
+class FrameClock:
     """Entry of a gait map for the clock of files that count frames or samples and have no time column."""
 
-    rate: Annotated[Text, Field(description="frames per second, such as '100 Hz'")]
+    rate: str = keyed("frames per second, such as '100 Hz'")
 
     def frequency(self) -> float:
         """Return the rate [Hz]; raises DataError for another unit, or a rate that is not above 0."""
@@ -46,48 +43,43 @@ class FrameClock(StrictTable):
         return rate
 
 
-class ShankMap(StrictTable):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LaboratoryAxes:
+    """Keys of the entry of an angle for the axes of its markers, None where it does not state them."""
+
+    forward: Axis | None = keyed("axis along the walk, with markers; default: the shank's, else x", None)
+    vertical: Vertical | None = keyed("axis upwards, with markers; default: the shank's, else z", None)
+
+    @property
+    def axes(self) -> tuple[Axis, Vertical]:
+        """Axes along the walk and upwards."""
+        return self.forward or "x", self.vertical or "z"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShankMap(LaboratoryAxes):
     """Entry of a gait map for the shank angle: a sum of columns, or two markers and the laboratory axes."""
 
     terms: _Terms | None = None
     unit: _Unit = None
-    positive: Annotated[Literal["ankle_in_front", "ankle_behind"], Field(description="which lean is positive")] = (
-        "ankle_in_front"
-    )
-    knee: Annotated[Text | None, Field(description="marker at the knee, instead of terms")] = None
-    ankle: Annotated[Text | None, Field(description="marker at the ankle")] = None
-    forward: Annotated[Axis, Field(description="axis along the walk")] = "x"
-    vertical: Annotated[Vertical, Field(description="axis upwards")] = "z"
-
-    @model_validator(mode="after")
-    def _one_way(self) -> "ShankMap":
-        if (self.terms is None) == (self.knee is None) or (self.knee is None) != (self.ankle is None):
-            raise ValueError("give either terms, or both knee and ankle")
-        return self
+    positive: Literal["ankle_in_front", "ankle_behind"] = keyed("which lean is positive", "ankle_in_front")
+    knee: str | None = keyed("marker at the knee, instead of terms", None)
+    ankle: str | None = keyed("marker at the ankle", None)
 
 
-class AngleMap(StrictTable):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AngleMap(LaboratoryAxes):
     """Entry of a gait map for the ankle angle: a sum of columns, or two foot markers relative to the shank.
 
     With markers, the zero is the flat foot; ``neutral`` is subtracted in both cases.
     """
 
     terms: _Terms | None = None
-    heel: Annotated[Text | None, Field(description="marker at the heel, instead of terms")] = None
-    toe: Annotated[Text | None, Field(description="marker at the toes")] = None
-    forward: Annotated[Axis, Field(description="axis along the walk, with markers; default: the shank's")] = "x"
-    vertical: Annotated[Vertical, Field(description="axis upwards, with markers; default: the shank's")] = "z"
+    heel: str | None = keyed("marker at the heel, instead of terms", None)
+    toe: str | None = keyed("marker at the toes", None)
     unit: _Unit = None
-    positive: Annotated[_Flexion, Field(description="which motion is positive")]
-    neutral: Annotated[
-        Text, Field(description="the reading of the file when the foot is perpendicular to the shank")
-    ] = "0 deg"
-
-    @model_validator(mode="after")
-    def _one_way(self) -> "AngleMap":
-        if (self.terms is None) == (self.heel is None) or (self.heel is None) != (self.toe is None):
-            raise ValueError("give either terms, or both heel and toe")
-        return self
+    positive: _Flexion = keyed("which motion is positive")
+    neutral: str = keyed("the reading of the file when the foot is perpendicular to the shank", "0 deg")
 
     def sign_and_neutral(self) -> tuple[float, float]:
         """Return 1 if plantarflexion is positive, else -1, and ``neutral`` [rad]; raises DataError for its unit."""
@@ -96,89 +88,84 @@ class AngleMap(StrictTable):
         return 1.0 if self.positive == "plantarflexion" else -1.0, neutral
 
 
-class MomentMap(StrictTable):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MomentMap:
     """Entry of a gait map for the ankle moment, in N m or N m/kg."""
 
     terms: _Terms
     unit: _Unit = None
-    positive: Annotated[_Flexion, Field(description="which internal moment is positive")]
+    positive: _Flexion = keyed("which internal moment is positive")
 
 
-class ForceMap(StrictTable):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForceMap:
     """Entry of a gait map for the vertical ground reaction on the foot, in N, or in body weights with the unit '-'."""
 
     terms: _Terms
     unit: _Unit = None
-    positive: Annotated[Literal["up", "down"], Field(description="which force is positive")] = "up"
+    positive: Literal["up", "down"] = keyed("which force is positive", "up")
 
 
-class PressureMap(StrictTable):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressureMap:
     """Entry of a gait map for the centre of pressure along the foot, from the ankle."""
 
     terms: _Terms
     unit: _Unit = None
-    positive: Annotated[Literal["forward", "backward"], Field(description="which direction is positive")] = "forward"
+    positive: Literal["forward", "backward"] = keyed("which direction is positive", "forward")
 
 
-class KneeMap(StrictTable):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KneeMap:
     """Entry of a gait map for the knee: position [m] or acceleration [m/s^2], or hip position and lean of the thigh."""
 
     forward: _Terms
     up: _Terms
     unit: _Unit = None
-    thigh: Annotated[
-        _Terms | None,
-        Field(description="lean of the thigh, above 0 with the knee in front; forward and up then are of the hip"),
-    ] = None
-    thigh_unit: Annotated[Text | None, Field(description="unit of the lean, where the file does not state it")] = None
-    thigh_length: Annotated[
-        Text | None, Field(description="hip to knee, such as '0.40 m'; default: a fraction of the stature")
-    ] = None
-
-    @model_validator(mode="after")
-    def _thigh_has_a_lean(self) -> "KneeMap":
-        if self.thigh is None and (self.thigh_length is not None or self.thigh_unit is not None):
-            raise ValueError("thigh_length and thigh_unit are given without thigh; omit them or give thigh")
-        return self
+    thigh: _Terms | None = keyed(
+        "lean of the thigh, above 0 with the knee in front; forward and up then are of the hip", None
+    )
+    thigh_unit: str | None = keyed("unit of the lean, where the file does not state it", None)
+    thigh_length: str | None = keyed("hip to knee, such as '0.40 m'; default: a fraction of the stature", None)
 
 
-_OF_THE_FORM = "default: the columns and sign of the file format"
+_OF_THE_FORM = Words("default: the columns and sign of the file format")
+_SHANK = ShankMap(terms=("shank_angle",))
+_ANKLE = AngleMap(terms=("ankle_angle",), positive="plantarflexion", neutral="90 deg")
 
 
-class GaitMap(StrictTable):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GaitMap:
     """Gait map: meaning of the columns of recorded files.
 
     A curve that is not listed has the columns, signs and units of the file format.
     """
 
     schema_version: SchemaVersion = 1
-    time: FrameClock | None = Field(None, description="sampling rate of files without a time column")
-    shank_angle: ShankMap = Field(default_factory=lambda: ShankMap(terms=("shank_angle",)), description=_OF_THE_FORM)
-    ankle_angle: AngleMap = Field(
-        default_factory=lambda: AngleMap(terms=("ankle_angle",), positive="plantarflexion", neutral="90 deg"),
-        description=_OF_THE_FORM,
-    )
-    ankle_moment: MomentMap | None = Field(None, description=_OF_THE_FORM)
-    vertical_force: ForceMap | None = Field(None, description=_OF_THE_FORM)
-    centre_of_pressure: PressureMap | None = Field(None, description=_OF_THE_FORM)
-    knee: KneeMap | None = Field(None, description=_OF_THE_FORM)
+    time: FrameClock | None = keyed("sampling rate of files without a time column", None)
+    shank_angle: ShankMap = keyed(_OF_THE_FORM, _SHANK)
+    ankle_angle: AngleMap = keyed(_OF_THE_FORM, _ANKLE)
+    ankle_moment: MomentMap | None = keyed(_OF_THE_FORM, None)
+    vertical_force: ForceMap | None = keyed(_OF_THE_FORM, None)
+    centre_of_pressure: PressureMap | None = keyed(_OF_THE_FORM, None)
+    knee: KneeMap | None = keyed(_OF_THE_FORM, None)
 
-    @model_validator(mode="before")
-    @classmethod
-    def _one_laboratory(cls, tables: Any) -> Any:
-        # One walk has one forward axis: it is stated once, with the shank.
-        shank, ankle = (_stated(tables.get(name)) for name in ("shank_angle", "ankle_angle"))
-        axes = {axis: shank[axis] for axis in ("forward", "vertical") if axis in shank}
-        return {**tables, "ankle_angle": {**axes, **ankle}} if axes and ankle else tables
+    def __post_init__(self) -> None:
+        """Take the axes that the ankle does not state from the shank: one walk has one forward axis."""
+        shank, ankle = self.shank_angle, self.ankle_angle
+        if ankle is not _ANKLE:
+            own = replace(ankle, forward=ankle.forward or shank.forward, vertical=ankle.vertical or shank.vertical)
+            object.__setattr__(self, "ankle_angle", own)
 
-
-def _stated(table: Any) -> Mapping[str, Any]:
-    """Return the keys that the map of a curve states."""
-    given = table.model_dump(exclude_unset=True) if isinstance(table, StrictTable) else table
-    return given if isinstance(given, Mapping) else {}
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Names of the curves that the map states."""
+        return tuple(
+            item.name for item in fields(self) if item.name in CURVES and getattr(self, item.name) is not item.default
+        )
 
 
-CURVES = tuple(name for name in GaitMap.model_fields if name not in ("schema_version", "time"))
+CURVES = tuple(item.name for item in fields(GaitMap) if item.name not in ("schema_version", "time"))
 """Names of the curves in a gait map."""
 
 _UNIT_OF_HEADER = re.compile(r"\s+\[[^\[\]]*\]$")
@@ -190,8 +177,7 @@ def column_names(mapped: object) -> tuple[str, ...]:
         return (*mapped.forward, *mapped.up, *(mapped.thigh or ()))
     if isinstance(mapped, ShankMap | AngleMap) and mapped.terms is None:
         markers = (mapped.knee, mapped.ankle) if isinstance(mapped, ShankMap) else (mapped.heel, mapped.toe)
-        axes = mapped.forward.removeprefix("-"), mapped.vertical
-        return tuple(f"{marker}.{axis}" for marker in markers for axis in axes)
+        return tuple(f"{marker}.{axis.removeprefix('-')}" for marker in markers for axis in mapped.axes)
     terms: tuple[str, ...] = getattr(mapped, "terms")  # noqa: B009  # every other map has them, by its own class
     # As in the header of a CSV file, whose units are no part of the names.
     return tuple(_UNIT_OF_HEADER.sub("", term) for term in terms)
@@ -201,9 +187,10 @@ def unsaid_axes(columns: GaitMap) -> list[str]:
     """Return remarks on assumed axes, for markers whose map does not state the forward or the upward axis."""
     axes = []
     for name, mapped in (("shank_angle", columns.shank_angle), ("ankle_angle", columns.ankle_angle)):
-        unsaid = [key for key in ("forward", "vertical") if key not in mapped.model_fields_set]
+        axes_of = dict(zip(("forward", "vertical"), mapped.axes, strict=True))
+        unsaid = [key for key in axes_of if getattr(mapped, key) is None]
         if mapped.terms is None and unsaid:
-            assumed_axes = " and ".join(f'{key} = "{getattr(mapped, key)}"' for key in unsaid)
+            assumed_axes = " and ".join(f'{key} = "{axes_of[key]}"' for key in unsaid)
             verb = "is" if len(unsaid) == 1 else "are"
             axes.append(f"the gait map does not give {' and '.join(unsaid)} of {name}: {assumed_axes} {verb} assumed")
     return axes
@@ -241,13 +228,25 @@ def opensim_map(side: Side) -> GaitMap:
 
 def load_map(path: str | Path) -> GaitMap:
     """Load a gait map from a TOML file; raises DataError if it cannot be used."""
-    loaded = read_model(_FILE, GaitMap, path)[0]
-    if loaded.model_fields_set <= {"schema_version"}:
-        raise DataError(f"{path}: the gait map has no curve, such as [ankle_angle]")
+    loaded, file = read_record(_FILE, GaitMap, path)
+    wrong = []
+    shank, ankle, knee = loaded.shank_angle, loaded.ankle_angle, loaded.knee
+    for name, terms, markers in (
+        ("shank_angle", shank.terms, {"knee": shank.knee, "ankle": shank.ankle}),
+        ("ankle_angle", ankle.terms, {"heel": ankle.heel, "toe": ankle.toe}),
+    ):
+        given = [marker for marker in markers.values() if marker is not None]
+        if len(given) != (2 if terms is None else 0):
+            wrong.append(f"{name}: give either terms, or both {' and '.join(markers)}")
+    if knee is not None and knee.thigh is None and (knee.thigh_length is not None or knee.thigh_unit is not None):
+        wrong.append("knee: thigh_length and thigh_unit are given without thigh; omit them or give thigh")
+    if not loaded.named and loaded.time is None:
+        wrong.append("the gait map has no curve, such as [ankle_angle]")
+    raise_noted([DataError(f"{file}: {fault}") for fault in wrong])
     return loaded
 
 
-json_schema = partial(make_schema, GaitMap, "ppafo gait map")
+json_schema = partial(record_schema, GaitMap, "ppafo gait map")
 """JSON Schema of a gait map."""
 
 

@@ -178,8 +178,8 @@ def between_markers(
     marker = {name: columns.table.columns[name] for _, name in columns.terms}
     for name, values in marker.items():
         check_recorded(values, f"{columns.table.file}: column {name!r}")
-    axis, vertical = mapped.forward.removeprefix("-"), mapped.vertical
-    sign = -1.0 if mapped.forward.startswith("-") else 1.0
+    forward, vertical = mapped.axes
+    axis, sign = forward.removeprefix("-"), -1.0 if forward.startswith("-") else 1.0
     ahead = sign * (marker[f"{second}.{axis}"] - marker[f"{first}.{axis}"])
     return ahead, marker[f"{second}.{vertical}"] - marker[f"{first}.{vertical}"]
 
@@ -223,7 +223,7 @@ def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
         ahead, up = between_markers(columns, mapped, str(mapped.knee), str(mapped.ankle))
         if abs(np.nanmean(up)) < _LEAST_UPRIGHT * math.hypot(np.nanmean(ahead), np.nanmean(up)):
             raise DataError(
-                f"{shank.file}: shank_angle.vertical = {mapped.vertical!r}, but the line from {mapped.knee!r} to "
+                f"{shank.file}: shank_angle.vertical = {mapped.axes[1]!r}, but the line from {mapped.knee!r} to "
                 f"{mapped.ankle!r} is no shank upright along it"
             )
     # Radians that are called degrees have no event either, but a unit as a remedy.
@@ -291,8 +291,7 @@ def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float)
 
 def _named_in(own: GaitMap | None) -> dict[str, list[str]]:
     """Return the columns that a user's map names, by curve in the order of the map, without their signs."""
-    mapped = {} if own is None else {name: getattr(own, name) for name in CURVES if name in own.model_fields_set}
-    named = {name: column_names(curve) for name, curve in mapped.items() if curve is not None}
+    named = {} if own is None else {name: column_names(getattr(own, name)) for name in own.named}
     return {name: [column.removeprefix("-") for column in columns] for name, columns in named.items()}
 
 
@@ -316,7 +315,7 @@ def _completed_map(own: GaitMap | None, tables: Sequence[MotionTable], side: Sid
             raise
         usual = Convention(own)
         problems = [f"only the curves of the gait map are imported: {error}"]
-    columns = usual.columns.model_copy(update={name: getattr(own, name) for name in own.model_fields_set})
+    columns = replace(usual.columns, time=own.time, **{name: getattr(own, name) for name in own.named})
     found = convention_of_map(columns, tables, side)
     plates = () if FORCE in named else found.plates or usual.plates
     on_others = tuple((curve, remark) for curve, remark in usual.curve_remarks if curve not in named)
@@ -366,8 +365,8 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
         raise_noted([*wrong, error])
     columns = convention.columns
     if settings.ankle_neutral is not None:
-        neutral = {"neutral": format_quantity(settings.ankle_neutral, "rad")}
-        columns = columns.model_copy(update={"ankle_angle": columns.ankle_angle.model_copy(update=neutral)})
+        neutral = format_quantity(settings.ankle_neutral, "rad")
+        columns = replace(columns, ankle_angle=replace(columns.ankle_angle, neutral=neutral))
     # Gaps matter in the columns in use only. A load of exactly 0 is no lost marker but a foot off the plate.
     used = _named_in(columns)
     names = [column for terms in used.values() for column in terms]

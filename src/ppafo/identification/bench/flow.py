@@ -17,14 +17,12 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Annotated, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
-from pydantic import Field
 from scipy.optimize import nnls
 
 from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
-from ppafo.documents.models import Quantified, Text
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.law import (
     BenchContext,
@@ -52,8 +50,10 @@ from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.source import RecordingSource, pool
 from ppafo.identification.tolerances import GAS_LAW as LIMIT_OF_GAS_LAW
 from ppafo.identification.tolerances import Tolerances
+from ppafo.model.declaration import Number
 from ppafo.model.gas import SPECIES, choked_flow_constant, critical_pressure_ratio, specific_gas_constant
 from ppafo.model.orifice import sonic_conductance_mass
+from ppafo.parameters.records import keyed
 from ppafo.report.kind import Kind
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.recording import Floats
@@ -138,12 +138,13 @@ class GasAt:
         return sonic_conductance_mass(1.0, self.specific_gas_constant, self.temperature)
 
 
+@dataclass(frozen=True, kw_only=True)
 class FlowLaw(BenchLaw):
     """Keys of a law in which gas flows."""
 
-    gas: Text | None = Field(None, description="species of the gas on the bench; default: the set's")
-    temperature: Annotated[float, Quantified("K", _COLDEST, _HOTTEST)] | None = Field(
-        None, description="of the gas on the bench, '17 degC'; default: the set's"
+    gas: str | None = keyed("species of the gas on the bench; default: the set's", None)
+    temperature: float | None = keyed(
+        Number("K", "of the gas on the bench, '17 degC'; default: the set's", None, _COLDEST, _HOTTEST), None
     )
 
     def gas_of(self, sources: tuple[RecordingSource, ...], context: BenchContext) -> GasAt:
@@ -407,14 +408,15 @@ def solve_flow(
     return solve(partial(shown_flow, opening, pressures), readings, numbers, confidence)
 
 
+@dataclass(frozen=True, kw_only=True)
 class OpenValveFlowProblem(FlowLaw):
     """Table of procedure open-valve-flow: Cd, or C and b of ISO 6358, of the fully open valve."""
 
     needed = CHANNELS
     row_time = 1.0
     kind: Literal["open-valve-flow"]
-    valve: Text | None = Field(None, description=VALVE)
-    law: Law = Field("orifice", description="flow law, also the form in which the set gives it")
+    valve: str | None = keyed(VALVE, None)
+    law: Law = keyed("flow law, also the form in which the set gives it", "orifice")
 
     def run(self, sources: tuple[RecordingSource, ...], context: BenchContext) -> BenchResult:
         """Identify Cd [-] or Cd A [m^2], C [m^3/(s Pa)] and b [-], or c [kg/(s Pa^2)] of the open valve.

@@ -12,13 +12,11 @@ Without an inertia only beta/I [1/s] and T_c/I [rad/s^2] can be estimated.
 """
 
 import math
-from dataclasses import replace
-from typing import Annotated, Literal, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
 
 import numpy as np
-from pydantic import Field
 
-from ppafo.documents.models import Quantified
 from ppafo.identification.bench.law import (
     BenchContext,
     BenchResult,
@@ -35,6 +33,8 @@ from ppafo.identification.bench.law import (
 from ppafo.identification.bench.readings import check_moves, check_no_gap, check_sources, without_wrong_samples
 from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.source import RecordingSource, window
+from ppafo.model.declaration import Number
+from ppafo.parameters.records import keyed
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.residuals import curve_mark, readings_mark
@@ -242,13 +242,21 @@ def course(times: Floats, speed: float, slowing: Slowing) -> _DecayCurve:
     return _DecayCurve(times, np.asarray(angle(inside)), np.asarray(angle.derivative()(inside)))
 
 
+@dataclass(frozen=True, kw_only=True)
 class FreeDecayProblem(TimedLaw):
     """Table of procedure free-decay: viscous damping and Coulomb friction from the decay after an impulse."""
 
     needed = (ANGLE,)
     kind: Literal["free-decay"]
-    inertia: Annotated[float, Quantified("kg m^2", above=0.0, nothing="unknown")] | None = Field(
-        None, description="such as '8.4 g m^2', or 'unknown'; default: the set's"
+    inertia: float | None = keyed(
+        Number(
+            "kg m^2",
+            "such as '8.4 g m^2', or 'unknown'; default: the set's",
+            minimum=0.0,
+            minimum_allowed=False,
+            words=("unknown",),
+        ),
+        None,
     )
 
     def inertia_of(self, context: BenchContext) -> tuple[float | None, float]:

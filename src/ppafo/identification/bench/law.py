@@ -1,16 +1,14 @@
 """Bench law: a table of a problem file that makes a result of recordings; readings, priors, fit, verdicts, panels."""
 
 import math
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from pydantic import Field
 
-from ppafo.documents.models import Quantified, StrictTable, Text
 from ppafo.errors import IdentificationError
 from ppafo.identification.estimate import Identified
 from ppafo.identification.fit import Fit, conflict_in_words, estimate_of, fit, wrong_shape
@@ -19,7 +17,9 @@ from ppafo.identification.new_set import stated_half_width
 from ppafo.identification.noise import SAMPLES_PER_COEFFICIENT
 from ppafo.identification.source import RecordingSource, kind_of, remarks_on_readings
 from ppafo.identification.tolerances import DEFAULTS, Columns, Confidence, Tolerances
+from ppafo.model.declaration import Number
 from ppafo.parameters.parameter_set import ParameterSet, chosen_valve, number_in_si, with_followers
+from ppafo.parameters.records import keyed
 from ppafo.report.panels import Panel, draw_panels
 from ppafo.signals import RecordingKind
 from ppafo.signals.faults import resolution_of, rounding_of
@@ -92,7 +92,8 @@ class BenchContext:
         return f"valves.{chosen_valve(self.parameter_set, name or self.valve)}"
 
 
-class BenchLaw(StrictTable):
+@dataclass(frozen=True, kw_only=True)
+class BenchLaw(ABC):
     """Table of a bench law: the keys that every law has, and what is declared of it.
 
     ``needed``: channels of every recording. ``row_time``: time [s] between rows of a table without a time column; None
@@ -102,7 +103,8 @@ class BenchLaw(StrictTable):
     needed: ClassVar[tuple[str, ...]]
     row_time: ClassVar[float | None] = None
     own_errors: ClassVar[tuple[str, ...]] = ()
-    recordings: tuple[Text, ...] = Field(strict=False, min_length=1, description="files, relative to this one")
+    kind: str
+    recordings: tuple[str, ...] = keyed("files, relative to this one")
     columns: Columns = None
     confidence: Confidence = 0.95
 
@@ -114,11 +116,12 @@ class BenchLaw(StrictTable):
         """
 
 
+@dataclass(frozen=True, kw_only=True)
 class TimedLaw(BenchLaw):
     """Keys of a law over time."""
 
-    start: Annotated[float, Quantified("s")] | None = Field(None, description="first time to use, such as '2 s'")
-    end: Annotated[float, Quantified("s")] | None = Field(None, description="last time to use, such as '8 s'")
+    start: float | None = keyed(Number("s", "first time to use, such as '2 s'"), None)
+    end: float | None = keyed(Number("s", "last time to use, such as '8 s'"), None)
 
 
 def result_of(

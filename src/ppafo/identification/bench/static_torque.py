@@ -217,6 +217,7 @@ def _change_per_sweep(source: RecordingSource, name: str) -> float:
     return abs(float(np.sum((direction[1:] * np.diff(source.recording[name]))[is_inside]))) / sweeps
 
 
+@dataclass(frozen=True, kw_only=True)
 class StaticTorqueProblem(BenchLaw):
     """Table of procedure static-torque: torque constant and static friction from rising and falling pressure.
 

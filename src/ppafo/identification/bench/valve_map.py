@@ -12,13 +12,11 @@ inside the dead band.
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
-from pydantic import Field
 
-from ppafo.documents.models import Text
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import (
     VALVE,
@@ -49,6 +47,7 @@ from ppafo.identification.source import RecordingSource, pool
 from ppafo.model.effects.kind import SECTION
 from ppafo.model.effects.opening import NODES
 from ppafo.model.valves.proportional import spool_position
+from ppafo.parameters.records import keyed
 from ppafo.report.kind import Kind
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.recording import Floats
@@ -135,18 +134,15 @@ def _swept(sources: tuple[RecordingSource, ...], gas: GasAt, zero: float) -> _Sw
     return _Sweep(command, measured, upstream, downstream, branch, areas, is_two_way, is_possible, remarks)
 
 
+@dataclass(frozen=True, kw_only=True)
 class ValveMapProblem(FlowLaw):
     """Table of procedure valve-map: dead band, gain, saturation and hysteresis from flow over command."""
 
     needed = CHANNELS
     row_time = 1.0
     kind: Literal["valve-map"]
-    valve: Text | None = Field(None, description=VALVE)
-    nodes: tuple[float, ...] = Field(
-        (),
-        strict=False,
-        description="commands of a table of openings; default: straight beyond a dead band",
-    )
+    valve: str | None = keyed(VALVE, None)
+    nodes: tuple[float, ...] = keyed("commands of a table of openings; default: straight beyond a dead band", ())
 
     def run(self, sources: tuple[RecordingSource, ...], context: BenchContext) -> BenchResult:
         """Identify dead band [-], gain [m^2], saturation [-] and hysteresis [-] from command and flow; (6), (7).

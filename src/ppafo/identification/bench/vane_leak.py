@@ -13,14 +13,12 @@ gain common to both sensors does not change the rate at which D falls.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Annotated, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
-from pydantic import Field
 
-from ppafo.documents.models import Quantified
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import (
     CRITICAL_RATIOS,
@@ -68,7 +66,9 @@ from ppafo.identification.fit import Fit
 from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.source import RecordingSource, pool, window
 from ppafo.identification.tolerances import Tolerances
+from ppafo.model.declaration import Number
 from ppafo.parameters.device import VANE
+from ppafo.parameters.records import keyed
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Panel
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
@@ -299,6 +299,7 @@ class LawFit(NamedTuple):
         return f"law = '{self.opening.law}' ({', '.join(quantities)})"
 
 
+@dataclass(frozen=True, kw_only=True)
 class VaneLeakProblem(FlowLaw, TimedLaw):
     """Table of procedure vane-leak: area, conductance or laminar coefficient from decaying pressure or steady flow.
 
@@ -307,18 +308,21 @@ class VaneLeakProblem(FlowLaw, TimedLaw):
 
     needed = CHANNELS
     kind: Literal["vane-leak", "vane-leak-steady"]
-    angle: Annotated[float, Quantified("rad")] | None = Field(
-        None, description="vane angle, from which the set's volumes follow"
+    angle: float | None = keyed(Number("rad", "vane angle, from which the set's volumes follow"), None)
+    law: Law = keyed(
+        "flow law; an orifice in the form of the set; 'iso6358': C and b; 'both': orifice and laminar gap", "orifice"
     )
-    law: Law = Field(
-        "orifice",
-        description="flow law; an orifice in the form of the set; 'iso6358': C and b; 'both': orifice and laminar gap",
+    volume_1: float | None = keyed(
+        Number(
+            "m^3",
+            "volume of chamber 1 with its line, '40 cm^3'; known to 5 %, or to bench.held",
+            minimum=0.0,
+            minimum_allowed=False,
+        ),
+        None,
     )
-    volume_1: Annotated[float, Quantified("m^3", above=0.0)] | None = Field(
-        None, description="volume of chamber 1 with its line, '40 cm^3'; known to 5 %, or to bench.held"
-    )
-    volume_2: Annotated[float, Quantified("m^3", above=0.0)] | None = Field(
-        None, description="volume of chamber 2 with its line"
+    volume_2: float | None = keyed(
+        Number("m^3", "volume of chamber 2 with its line", minimum=0.0, minimum_allowed=False), None
     )
 
     def volumes_of(self, context: BenchContext) -> tuple[float | None, float | None, float]:

@@ -105,7 +105,7 @@ def _experiment(entry: ExperimentSection, context: SectionContext) -> FittedExpe
     # The scenario of a replay has the state of the samples already.
     is_read = entry.scenario is not None and entry.initial_state in ("recording", "fitted")
     state: InitialState = "recording" if is_read else "scenario"
-    noise, recording = entry.noise.model_dump(exclude_none=True), source.recording
+    noise, recording = entry.noise.by_channel(), source.recording
     return FittedExperiment(entry.label, scenario, recording, start, channels, noise, inputs, state, source.trace)
 
 
@@ -189,7 +189,7 @@ def solve_section(section: TrajectorySection, context: SectionContext, report: R
             scenario = _scenario(entry.scenario, entry.overrides, context)
             if entry.interval > (longest := scenario.run.duration):
                 raise IdentificationError(f"{where}: interval = {entry.interval:g} s must be at most {longest:g} s")
-            noise = entry.noise.model_dump(exclude_none=True)
+            noise = entry.noise.by_channel()
             candidates.append(CandidateExperiment(entry.label, scenario, noise, entry.interval))
         fitted = fit(problem, report)
         expected = expected_information(fitted, candidates)

@@ -11,7 +11,7 @@ from ppafo.errors import ParameterError, UnitError
 from ppafo.model.gas import SECOND_VIRIAL, SPECIES, choked_flow_constant, critical_pressure_ratio
 from ppafo.model.orifice import subsonic_flow_constant
 from ppafo.parameters.audit.evidence import GAS_PATHS, AuditFinding, ComparedNumber, Evidence
-from ppafo.parameters.building import contradictions, missing_values, read_device
+from ppafo.parameters.building import contradictions_of_set, missing_values, read_device
 from ppafo.parameters.declaration import is_within
 from ppafo.parameters.device import Gas
 from ppafo.parameters.parameter_set import entry_in_si, entry_text, number_in_si
@@ -219,7 +219,7 @@ def check_contradictions(evidence: Evidence) -> Iterator[AuditFinding]:
         # A value that is missing or wrong by itself has a finding of its own.
         with contextlib.suppress(ParameterError):
             device = read_device(parameter_set, valve, {})
-            found |= {line: paths for paths, line in contradictions(parameter_set, device)}
+            found |= {line: paths for paths, line in contradictions_of_set(parameter_set, device)}
     for line, paths in found.items():
         yield AuditFinding(
             id=paths[0].replace(".", "-").replace("_", "-"),

@@ -30,7 +30,8 @@ from ppafo.model.source import (
 )
 from ppafo.parameters.declared import Field, InnerTable, Words, check_keys, inside, schema_of, value_at
 from ppafo.parameters.overrides import Forms, other_forms, override_set, read_overrides
-from ppafo.parameters.parameter_set import NUMBER_ENTRY, SOURCE, TEXT_ENTRY, Entry, allowed_number, number_entry
+from ppafo.parameters.parameter_set import NUMBER_ENTRY, SOURCE, TEXT_ENTRY, Entry, allowed_number
+from ppafo.parameters.records import record_from
 from ppafo.units import format_quantity, split_quantity
 from ppafo.units.shown import shown_text
 from ppafo.wording import changed_text, known_names, nearest_name, said_missing
@@ -294,7 +295,7 @@ def _read(name_or_path: str | Path) -> tuple[dict[str, Any], str]:
 def _entries_of(document: Mapping[str, Any]) -> dict[str, Entry]:
     """Return the numbers given in a bottle file, by dotted path."""
     tables = {path: table for path in PATHS if (table := value_at(document, path)) is not None}
-    return {path: number_entry(table) for path, table in tables.items()}
+    return {path: record_from(Entry, table) for path, table in tables.items()}
 
 
 def _build(parsed: Mapping[str, Any], entries: Mapping[str, Entry], file: str) -> Bottle:

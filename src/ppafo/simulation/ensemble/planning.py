@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,21 +9,16 @@ from numpy.typing import NDArray
 
 from ppafo.engine.lanes import Batch
 from ppafo.engine.run import Members, Run, batches_of
-from ppafo.model.catalog import ACTUATORS
-from ppafo.model.columns import Problem, at
-from ppafo.parameters.building import actuator_problem, beyond_pressures, consistency, growth_and_problem
+from ppafo.model.columns import Problem
+from ppafo.parameters.building import contradictions
 from ppafo.parameters.declaration import is_within, range_rule
-from ppafo.parameters.effects import number_under, switches_of
+from ppafo.parameters.effects import switches_of
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.contradictions import problems_of
 from ppafo.simulation.ensemble.columns import ScenarioColumns
 from ppafo.simulation.motion_kind import RunTimes
-from ppafo.simulation.numbers import NOISE_SEED, declared_numbers, with_numbers
+from ppafo.simulation.numbers import NOISE_SEED, with_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.units.shown import shown_text
-
-_SHAPE = ("angle_min", "angle_max", "dead_volume_1", "dead_volume_2")
-"""Numbers of an actuator that have to fit its settings."""
 
 
 @dataclass(slots=True)
@@ -164,41 +158,5 @@ def _first_problem(problems: Iterable[Problem]) -> Problem | None:
 
 def _contradictory_numbers(scenario: Scenario) -> Iterator[Problem]:
     """Yield the problems of contradictory numbers of a scenario of many runs; later checks rely on earlier ones."""
-    device = scenario.device
-    for path, relation, other, holds in consistency(device):
-        yield np.logical_not(holds), partial(_inconsistent_line, scenario, path, relation, other)
-    yield from _misshapen(scenario)
-    is_beyond, line = beyond_pressures(device)
-    yield is_beyond, lambda run: f"actuator: {line(run)}"
-    yield growth_and_problem(device)[1]
+    yield from (problem for _, problem in contradictions(scenario.device))
     yield from problems_of(scenario)
-
-
-def _inconsistent_line(scenario: Scenario, path: str, relation: str, other: str, run: int) -> str:
-    """Message about two contradictory numbers of a device in a run."""
-    unit, room = declared_numbers(scenario)[path].unit, at(scenario.device.supply.atmospheric_pressure, run)
-    number, limit = (
-        shown_text(at(number_under(scenario.device, each.split(".")), run), unit, ".9g", room) for each in (path, other)
-    )
-    return f"{path} = {number} must be {relation} {other} = {limit}"
-
-
-def _misshapen(scenario: Scenario) -> tuple[Problem, ...]:
-    """Problems of an actuator whose numbers are inconsistent although each is in range."""
-    actuator = scenario.device.actuator
-    if ACTUATORS[actuator.kind].problem is None and actuator.table is None:
-        return ()
-    numbers: list[Any] = [*(getattr(actuator, name) for name in _SHAPE), *actuator.settings.values()]
-    varied = [value for value in numbers if isinstance(value, np.ndarray)]
-    if not varied:
-        return ()
-
-    def problem_of(run: int) -> str:
-        numbers: dict[str, Any] = {name: at(getattr(actuator, name), run) for name in _SHAPE}
-        settings = {name: at(value, run) for name, value in actuator.settings.items()}
-        problem = actuator_problem(replace(actuator, **numbers, settings=settings))
-        return f"actuator: {problem}" if problem else ""
-
-    # A kind checks single numbers, so the runs are gone through one by one.
-    problems = [problem_of(run) for run in range(varied[0].size)]
-    return ((np.array([bool(line) for line in problems]), lambda run: problems[run]),)

@@ -16,9 +16,7 @@ from tests.unit.identification import planted
 from tests.unit.identification.planted import open_valve_flow, valve_map, vane_leak
 
 VOLUME = 60e-6
-EXACT = Tolerances.model_construct(
-    gas_temperature=0.0, gas_law=0.0, zero_of_pressure=0.0, gain=0.0, zero_of_flow=0.0, held=0.0
-)
+EXACT = Tolerances(gas_temperature=0.0, gas_law=0.0, zero_of_pressure=0.0, gain=0.0, zero_of_flow=0.0, held=0.0)
 EFFECTIVE = 0.3e-6 * 0.113
 AREA = "actuator.leak.area"
 
@@ -81,7 +79,7 @@ def test_the_drawn_curve_has_the_zero_of_the_meter_as_the_residuals_have() -> No
     upstream, downstream = source.recording["upstream_pressure"], source.recording["downstream_pressure"]
     flow = 7.0e-9 * planted.CO2.flow_per_sonic_conductance * iso6358_shape(upstream, downstream, 0.2)
     shown = changed(source, "mass_flow", flow + 0.04 * flow.max())
-    tolerances = Tolerances.model_construct(gas_temperature=0.0, gas_law=0.0, zero_of_pressure=0.0, gain=0.0)
+    tolerances = Tolerances(gas_temperature=0.0, gas_law=0.0, zero_of_pressure=0.0, gain=0.0)
     result = open_valve_flow((shown,), planted.CO2, law="iso6358", tolerances=tolerances)
     curve = next(mark for mark in result.panels[0].marks if mark.label == "ISO 6358")
     order = np.argsort(downstream / upstream)
@@ -227,7 +225,7 @@ def test_a_planted_orifice_leak_gives_its_area_whichever_chamber_empties(turned:
         planted.CO2,
         *volumes,
         discharge_coefficient=0.113,
-        tolerances=Tolerances.model_construct(held=0.01 * math.sqrt(3.0)),
+        tolerances=Tolerances(held=0.01 * math.sqrt(3.0)),
     )[AREA]
     assert area.low <= 0.3e-6 <= area.high
     assert area.half_width < 0.05 * area.value

@@ -45,7 +45,7 @@ def test_planted_damping_and_friction_lie_inside_their_intervals(sign: float) ->
         (planted.decay(sign=sign),),
         inertia="8.4 g m^2",
         rise=0.0,
-        tolerances=Tolerances.model_construct(gain=0.0, held=0.0),
+        tolerances=Tolerances(gain=0.0, held=0.0),
     )
     for path, ratio in (
         ("friction.viscous_damping", planted.DAMPING_RATE),
@@ -76,7 +76,7 @@ def test_an_unknown_inertia_leaves_only_ratios_and_says_so() -> None:
 
 
 def test_an_uncertain_inertia_widens_what_depends_on_it() -> None:
-    known = Tolerances.model_construct(held=0.1)
+    known = Tolerances(held=0.1)
     damping = free_decay((planted.decay(),), "8.4 g m^2", 0.0, known)["friction.viscous_damping"]
     assert damping.half_width / damping.value == pytest.approx(0.1 / np.sqrt(3.0) * 1.96, rel=0.05)
     assert "inertia" in damping.explanation

@@ -32,10 +32,10 @@ def test_intervals_hold_friction_and_its_growth_in_about_the_stated_share_of_rec
 
 
 def test_the_gains_of_the_sensors_widen_the_torque_constant_and_are_named() -> None:
-    known = Tolerances.model_construct(gain=0.0)
+    known = Tolerances(gain=0.0)
     usual, exact = (
         static_torque((planted.static(),), tolerances=item)["actuator.torque_constant"]
-        for item in (Tolerances.model_construct(), known)
+        for item in (Tolerances(), known)
     )
     assert usual.half_width > 1.2 * exact.half_width
     assert "gain of the pressure sensor" in usual.explanation

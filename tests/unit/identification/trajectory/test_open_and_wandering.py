@@ -25,7 +25,7 @@ LEAK = 0.3e-6
 
 def fitted(experiment: FittedExperiment, *sought: FitNumber) -> TrajectoryFit:
     stated = stated_by(load_parameter_set("ppafo2011"), experiment.scenario)
-    tolerances = tolerance_parameters(Tolerances.model_construct(), (experiment,), sought, stated)
+    tolerances = tolerance_parameters(Tolerances(), (experiment,), sought, stated)
     return fit(TrajectoryProblem((*sought, *tolerances), (experiment,)))
 
 

@@ -75,7 +75,7 @@ def fitted(swing: FittedExperiment, *friction: FitNumber) -> TrajectoryFit:
         FitNumber("friction.viscous_damping", math.nan, 0.0, 0.5),
         *friction,
     )
-    tolerances = tolerance_parameters(Tolerances.model_construct(held=0.0), (swing,), parameters)
+    tolerances = tolerance_parameters(Tolerances(held=0.0), (swing,), parameters)
     return fit(TrajectoryProblem((*parameters, *tolerances), (swing,)))
 
 

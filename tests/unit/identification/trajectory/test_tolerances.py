@@ -9,7 +9,6 @@ import pytest
 from scipy.signal import lfilter
 
 from ppafo.constants import PASCALS_PER_PSI
-from ppafo.documents.models import validate
 from ppafo.errors import IdentificationError
 from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
@@ -22,35 +21,36 @@ from ppafo.identification.trajectory.experiment import (
     with_numbers,
 )
 from ppafo.identification.trajectory.fitting import fit, prepare, signals_at
+from ppafo.parameters.records import checked_record, record_from
 from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 
-STATED = Tolerances.model_construct(supply=PASCALS_PER_PSI, zero_of_pressure=0.15 * PASCALS_PER_PSI, gain=0.003)
+STATED = Tolerances(supply=PASCALS_PER_PSI, zero_of_pressure=0.15 * PASCALS_PER_PSI, gain=0.003)
 
 
 def test_tolerances_are_read_with_their_units() -> None:
     stated = {"load": "2 %", "supply": "1 psi_d", "zero_of_angle": "0.3 deg", "gain": "0.3 %"}
-    found = Tolerances.model_validate(stated)
+    found = record_from(Tolerances, stated)
     assert found.load == 0.02
     assert found.supply == pytest.approx(PASCALS_PER_PSI)
     assert found.zero_of_angle == pytest.approx(math.radians(0.3))
     assert found.zero_of_pressure == pytest.approx(0.3 * PASCALS_PER_PSI)
-    assert Tolerances.model_validate({}) == DEFAULTS
+    assert record_from(Tolerances, {}) == DEFAULTS
 
 
 @pytest.mark.parametrize(
     ("key", "text", "words"),
     [
         ("supply", "1 psi", "psi_d for a difference"),
-        ("supply", "-1 psi_d", "must be at least 0 Pa_d"),
-        ("load", "70 %", "at most 0.5"),
+        ("supply", "-1 psi_d", "must be at least 0 psi_d"),
+        ("load", "70 %", "at most 50 %"),
     ],
 )
 def test_a_tolerance_that_is_none_is_refused_in_one_line(key: str, text: str, words: str) -> None:
     with pytest.raises(IdentificationError, match=f"^file: {key} = '{text}': .*{words}"):
-        validate(Tolerances, {key: text}, "file", IdentificationError)
+        checked_record(Tolerances, {key: text}, "file", IdentificationError)
 
 
 def test_supplies_are_those_of_a_recording_and_zeros_and_gains_those_of_a_sensor(experiment: FittedExperiment) -> None:
@@ -74,52 +74,40 @@ def test_supplies_are_those_of_a_recording_and_zeros_and_gains_those_of_a_sensor
 
 
 def test_a_number_of_the_set_is_held_with_what_the_set_states_or_else_a_default(experiment: FittedExperiment) -> None:
-    found = tolerance_parameters(Tolerances.model_construct(), (experiment,), (), {"actuator.torque_constant": 1.0e-6})
+    found = tolerance_parameters(Tolerances(), (experiment,), (), {"actuator.torque_constant": 1.0e-6})
     deviations = {item.path: item.deviation for item in found}
     assert deviations["actuator.torque_constant"] == pytest.approx(1.0e-6 / 1.96, rel=1e-3)
     assert deviations["foot_plate.inertia"] == pytest.approx(0.05 * 0.0084 / math.sqrt(3.0))
     assert deviations["gas.temperature"] == pytest.approx(15.0 / math.sqrt(3.0))
     assert "valves.proportional.area" not in deviations
-    exact = tolerance_parameters(
-        Tolerances.model_construct(held=0.0, gas_temperature=0.0, gas_law=0.0), (experiment,), ()
-    )
+    exact = tolerance_parameters(Tolerances(held=0.0, gas_temperature=0.0, gas_law=0.0), (experiment,), ())
     assert not any(item.path.startswith(("gas.", "friction.", "actuator.")) for item in exact)
 
 
 def test_friction_at_rest_may_last_in_a_motion_up_to_a_velocity_where_the_set_says_nothing_of_it(
     experiment: FittedExperiment,
 ) -> None:
-    found, share = (
-        one for one in tolerance_parameters(Tolerances.model_construct(), (experiment,), ()) if "stribeck" in one.path
-    )
+    found, share = (one for one in tolerance_parameters(Tolerances(), (experiment,), ()) if "stribeck" in one.path)
     assert found.is_logarithm
     assert math.log(0.5 / found.start) == pytest.approx(1.645 * found.deviation)
     # A share that is held would make its error one of the static friction: it is a tolerance as every other number.
     assert (share.path, share.start) == ("effects.stribeck.share", 0.9)
     assert share.deviation == pytest.approx(0.3 * 0.9 / math.sqrt(3.0))
     sought = FitNumber("effects.stribeck.velocity", start=0.2)
-    beside = [
-        one.path
-        for one in tolerance_parameters(Tolerances.model_construct(), (experiment,), (sought,))
-        if "stri" in one.path
-    ]
+    beside = [one.path for one in tolerance_parameters(Tolerances(), (experiment,), (sought,)) if "stri" in one.path]
     assert beside == ["effects.stribeck.share"]
     own = replace(experiment, scenario=with_numbers(experiment.scenario, {"effects.stribeck.velocity": 0.2}))
     (stated,) = (
-        one
-        for one in tolerance_parameters(Tolerances.model_construct(), (own,), ())
-        if one.path.endswith("stribeck.velocity")
+        one for one in tolerance_parameters(Tolerances(), (own,), ()) if one.path.endswith("stribeck.velocity")
     )
     assert not stated.is_logarithm
-    exact = tolerance_parameters(Tolerances.model_construct(stribeck_velocity=0.0), (experiment,), ())
+    exact = tolerance_parameters(Tolerances(stribeck_velocity=0.0), (experiment,), ())
     assert not any("stribeck" in one.path for one in exact)
 
 
 def test_a_start_read_from_noisy_samples_is_known_to_their_noise(experiment: FittedExperiment) -> None:
     inside = replace(experiment, start=0.05, initial_state="recording")
-    deviations = {
-        item.path: item.deviation for item in tolerance_parameters(Tolerances.model_construct(), (inside,), ())
-    }
+    deviations = {item.path: item.deviation for item in tolerance_parameters(Tolerances(), (inside,), ())}
     assert deviations["motion.angle"] == pytest.approx(math.radians(math.hypot(0.05, 0.1)), rel=0.1)
     assert deviations["initial.pressure_1"] == pytest.approx(500.0, rel=0.2)
 
@@ -128,16 +116,14 @@ def test_a_followed_supply_has_the_zero_of_its_sensor(experiment: FittedExperime
     count = len(experiment.recording)
     recording = experiment.recording.with_channel("supply_pressure", np.full(count, 4.8e5), "Pa")
     followed = replace(experiment, recording=recording, inputs=("supply_pressure",))
-    paths = [item.path for item in tolerance_parameters(Tolerances.model_construct(), (followed,), ())]
+    paths = [item.path for item in tolerance_parameters(Tolerances(), (followed,), ())]
     assert "recording.zero_of_supply_pressure" in paths
     assert "supply.pressure" not in paths
 
 
 def test_a_sensor_that_is_mounted_anew_has_a_zero_in_each_recording(experiment: FittedExperiment) -> None:
     other = replace(experiment, label="other")
-    found = tolerance_parameters(
-        Tolerances.model_construct(gain=0.003, each_recording=("gain",)), (experiment, other), ()
-    )
+    found = tolerance_parameters(Tolerances(gain=0.003, each_recording=("gain",)), (experiment, other), ())
     gains = [item for item in found if item.path.startswith("recording.gain")]
     assert [item.recordings for item in gains] == [("step",), ("other",)] * 3
 
@@ -197,9 +183,7 @@ def test_errors_of_the_bench_hide_no_number_where_they_are_tolerances(recorded: 
     inertia = number_at(planned["there"], "foot_plate.inertia")
 
     plain = fit(TrajectoryProblem(free, experiments))
-    stated = fit(
-        TrajectoryProblem((*free, *tolerance_parameters(Tolerances.model_construct(), experiments, free)), experiments)
-    )
+    stated = fit(TrajectoryProblem((*free, *tolerance_parameters(Tolerances(), experiments, free)), experiments))
 
     without, with_them = plain.estimate("foot_plate.inertia"), stated.estimate("foot_plate.inertia")
     assert not without.low <= inertia <= without.high
@@ -230,9 +214,7 @@ def test_the_lag_of_a_filtered_sensor_is_no_dead_time_of_the_valve(path: str, la
     start = truth if "delay" not in path else load_scenario("step-response", [*common, "valve.delay=10 ms"])
     experiment = FittedExperiment("one", start, Recording("filtered", time, channels), channels=tuple(channels))
     sought = (FitNumber(path),)
-    problem = TrajectoryProblem(
-        (*sought, *tolerance_parameters(Tolerances.model_construct(), [experiment], sought)), (experiment,)
-    )
+    problem = TrajectoryProblem((*sought, *tolerance_parameters(Tolerances(), [experiment], sought)), (experiment,))
     found = fit(problem)
     assert found.estimates[0].low <= number_at(truth, path) <= found.estimates[0].high
     assert found.estimates[0].is_identified

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,8 +26,6 @@ from ppafo.signals.recording import Floats
 
 PLATE = "force plate "
 """Prefix of the columns ``force plate 1.x``, ``.y``, ``.z`` [N]: force on a plate in laboratory axes."""
-
-_AXIS_KEYS = {"forward", "vertical"}
 
 _FORWARDS: tuple[Axis, ...] = ("x", "y", "z", "-x", "-y", "-z")
 
@@ -100,21 +99,19 @@ def convention_of_map(columns: GaitMap, tables: Sequence[MotionTable], side: Sid
     labels = _recorded_labels(table)
     _check_forward(table, columns, side[0], labels)
     mapped: dict[str, ShankMap | AngleMap] = {"shank_angle": shank, "ankle_angle": columns.ankle_angle}
-    unsaid = [name for name, each in mapped.items() if each.terms is None and not each.model_fields_set >= _AXIS_KEYS]
+    unsaid = [name for name, each in mapped.items() if each.terms is None and not (each.forward and each.vertical)]
     remarks: tuple[str, ...] = ()
     if unsaid and {shank.knee, shank.ankle} <= set(labels):
         forward, vertical, remarks = _axes(table, shank.knee, shank.ankle, side[0], labels)
-        found = {"forward": forward, "vertical": vertical}
-        changed = {
-            name: mapped[name].model_copy(
-                update={key: value for key, value in found.items() if key not in mapped[name].model_fields_set}
-            )
-            for name in unsaid
+        changed: dict[str, Any] = {
+            name: replace(each, forward=each.forward or forward, vertical=each.vertical or vertical)
+            for name, each in mapped.items()
+            if name in unsaid
         }
-        columns = columns.model_copy(update=changed)
+        columns = replace(columns, **changed)
     else:
         remarks = tuple(unsaid_axes(columns))
-    vertical = columns.shank_angle.vertical
+    vertical = columns.shank_angle.axes[1]
     is_free = columns.vertical_force is None
     plates = tuple(name for name in table.columns if is_free and name.startswith(PLATE) and name.endswith(vertical))
     return Convention(columns, plates, remarks)
@@ -125,7 +122,7 @@ def _check_forward(table: MotionTable, columns: GaitMap, foot: str, labels: Sequ
     shank, ankle = columns.shank_angle, columns.ankle_angle
     heel, toe = ankle.heel or _first(labels, foot, _HEELS), ankle.toe or _first(labels, foot, _TOES)
     for name, mapped in (("shank_angle", shank), ("ankle_angle", ankle)):
-        if mapped.terms is not None or "forward" not in mapped.model_fields_set:
+        if mapped.terms is not None or mapped.forward is None:
             continue
         axis, sign = mapped.forward[-1], -1.0 if mapped.forward.startswith("-") else 1.0
         tip, back, way = (table.columns.get(f"{label}.{axis}") for label in (toe, heel, shank.ankle))

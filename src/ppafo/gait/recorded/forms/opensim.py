@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -174,7 +174,7 @@ def opensim_convention(table: MotionTable, side: Side, _body_mass: float) -> Con
         # Where its flexion counts above 0, as in the newer OpenSim models, the knee is subtracted.
         counts_above = flexion is not None and bool(np.nanmax(flexion) > -np.nanmin(flexion))
         terms.append(f"-{name}" if counts_above else name)
-    maps: dict[str, object] = {"shank_angle": ShankMap(terms=tuple(terms))}
+    maps: dict[str, Any] = {"shank_angle": ShankMap(terms=tuple(terms))}
     # What this package writes for OpenSim beside its coordinates (``storage/opensim.py``) is read as it is.
     if f"shank_angle_{side[0]}" in table.columns:
         maps["shank_angle"] = ShankMap(terms=(f"shank_angle_{side[0]}",))
@@ -182,7 +182,7 @@ def opensim_convention(table: MotionTable, side: Side, _body_mass: float) -> Con
         maps["knee"] = KneeMap(forward=("knee_forward",), up=("knee_up",), unit="m/s^2")
     if "centre_of_pressure" in table.columns:
         maps["centre_of_pressure"] = PressureMap(terms=("centre_of_pressure",), unit="m")
-    usual = usual.model_copy(update=maps)
+    usual = replace(usual, **maps)
     # Columns of vertical force that name this foot, the other foot, or none.
     forces: tuple[list[str], list[str], list[str]] = ([], [], [])
     own, other, numbered = forces
@@ -196,10 +196,10 @@ def opensim_convention(table: MotionTable, side: Side, _body_mass: float) -> Con
         plates = tuple(own or numbered)
         summed = f"vertical force: the sum of {' and '.join(plates)}"
         remarks = (("vertical_force", summed),) if len(plates) > 1 else ()
-        return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=plates)}), curve_remarks=remarks)
+        return Convention(replace(usual, vertical_force=ForceMap(terms=plates)), curve_remarks=remarks)
     if len(numbered) == 1 and side == "right":
-        return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=tuple(numbered))}))
-    return Convention(usual.model_copy(update={"vertical_force": None}), tuple(numbered))
+        return Convention(replace(usual, vertical_force=ForceMap(terms=tuple(numbered))))
+    return Convention(replace(usual, vertical_force=None), tuple(numbered))
 
 
 _TURN = 45.0
