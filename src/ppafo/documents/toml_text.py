@@ -38,6 +38,8 @@ KEY_LINE = re.compile(
 """Header of a table, or key of a value, at the begin of a line."""
 _SIGNS = {"scenario": {"device", "controller"}, "parameter set": {"default_valve", "valves"}}
 """Keys that only files of a kind have, by the noun of the kind."""
+_WITH_COMMA = re.compile(r"(?<![\w.,])[+-]?\d[\d.]*,[\d.,]*\d")
+"""Number with a decimal comma, or with commas between thousands."""
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _TOO_DEEP = f"has tables nested deeper than {MAXIMUM_LEVELS} levels; a few are enough"
 
@@ -92,7 +94,7 @@ class TomlKind:
             # A copy, since overrides are written into a document and the parsed one is kept.
             document = copy.deepcopy(_document(text))
         except tomllib.TOMLDecodeError as error:
-            said = _twice(text, str(error)) or f"is not valid TOML: {one_line(error)}"
+            said = _comma(text, str(error)) or _twice(text, str(error)) or f"is not valid TOML: {one_line(error)}"
             raise self.error(f"{file}: {said}") from error
         except (RecursionError, ValueError) as error:
             raise self.error(f"{file}: is not usable TOML: it is nested too deeply, or a number is too long") from error
@@ -106,6 +108,18 @@ class TomlKind:
         """Raise an error for tables nested too deeply; ``file`` is the label in messages."""
         if is_nested_too_deeply(document):
             raise self.error(f"{file}: {_TOO_DEEP}")
+
+
+def _comma(text: str, error: str) -> str:
+    """Return the message on a number with a comma in it; empty for another ``error`` of the parser."""
+    found = re.search(r"\(at line (\d+), column (\d+)\)", error)
+    line, column = (text.split("\n")[int(found[1]) - 1], int(found[2]) - 1) if found else ("", 0)
+    numbers = (each for each in _WITH_COMMA.finditer(line) if each.start() < column <= each.end())
+    number, key = next(numbers, None), KEY_LINE.match(line)
+    # Of a list the comma separates two numbers.
+    if found is None or number is None or key is None or "[" in line[: number.start()]:
+        return ""
+    return f"line {found[1]}: {one_line(key['key'])} = {number[0]}: a number has a point for its decimals, and no comma"
 
 
 def _twice(text: str, error: str) -> str:

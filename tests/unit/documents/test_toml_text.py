@@ -42,6 +42,12 @@ def test_a_number_that_would_become_0_is_refused() -> None:
     assert KIND.parse(b"value = 0.0e-400", "mine.toml") == {"value": 0.0}
 
 
+@pytest.mark.parametrize("text", ["mine = 28,014  # kg", "mine = { value = 28,014, unit = 'kg' }", "mine = -1.234,5"])
+def test_a_comma_in_a_number_is_named(text: str) -> None:
+    with pytest.raises(ScenarioError, match=r"^file: line 2: mine = (28,014|-1\.234,5): a number has a point"):
+        KIND.parse(f"[table]\n{text}\n".encode(), "file")
+
+
 @pytest.mark.parametrize("text", ["[{}]", "{} = 1", "mine = {{{} = 1}}", "[[ {} ]]"])
 @pytest.mark.parametrize("dot", [".", " . "])
 def test_a_key_of_very_many_dots_is_refused_at_once(text: str, dot: str) -> None:

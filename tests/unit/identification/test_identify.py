@@ -280,13 +280,13 @@ def test_figures_and_files_are_there_for_each_procedure_and_figure_3_for_both(so
         ),
         (STATIC.replace("static.csv", "decay.csv"), "decay.csv: static-torque: needs a channel 'torque [N m]'"),
         (f'{DECAY}start = "2 m"\n', "procedure.1.start = '2 m': unit 'm' does not fit"),
-        (f'{DECAY}inertia = "0 kg m^2"\n', "must be above 0 kg m^2"),
+        (f'{DECAY}inertia = "0 kg m^2"\n', "must be more than 0 kg m^2"),
         (f'{FLOW}valve = "proportionl"\n', "did you mean 'proportional'"),
-        (f'{FLOW}temperature = "17 K"\n', "temperature = '17 K': must be at least 150 and at most 600 K"),
+        (f'{FLOW}temperature = "17 K"\n', "temperature = '17 K': must be at least 150 K and at most 600 K"),
         (f'{FLOW}temperature = "17 kg"\n', "temperature = '17 kg': unit 'kg' does not fit"),
         (f'{FLOW}gas = "CO3"\n', "gas = 'CO3' is unknown, did you mean 'CO2'"),
         (LEAK.replace('volume_1 = "60 cm^3"', 'angle = "200 deg"'), "lies beyond the stops"),
-        (LEAK.replace("60 cm^3", "0 cm^3"), "volume_1 = '0 cm^3': must be above 0 m^3"),
+        (LEAK.replace("60 cm^3", "0 cm^3"), "volume_1 = '0 cm^3': must be more than 0 cm^3"),
         ('procedure = "none"\n', "procedure"),
         (f"{STATIC}{MAPPED}direction.thresold = 3\n", "did you mean 'threshold'"),
         (f"{STATIC}{MAPPED}channels.time.colum = 3\n", "did you mean 'column'"),
@@ -446,9 +446,9 @@ def test_bench_and_trajectory_hold_a_number_alike() -> None:
     experiment = FittedExperiment("step", scenario, simulate(scenario).recording)
     stated = stated_by(chosen.parameter_set, scenario)
     held = {one.path: one.deviation for one in tolerance_parameters(Tolerances(), (experiment,), (), stated)}
-    leak = VaneLeakProblem(kind="vane-leak", recordings=("leak.csv",), angle="60 deg")
+    leak = VaneLeakProblem(kind="vane-leak", recordings=("leak.csv",), angle=math.radians(60.0))
     decay = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",))
-    told = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",), inertia="8.4 g m^2")
+    told = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",), inertia=8.4e-3)
     assert decay.inertia_of(chosen)[1] == held["foot_plate.inertia"] == told.inertia_of(chosen)[1]
     assert leak.gas_of((), chosen).temperature_deviation == held["gas.temperature"]
     # The displacement is known as well as the torque constant, which it follows.
