@@ -278,9 +278,9 @@ class FieldLayout:
         """Yield the keys that are missing where a field is not given: of a table its required keys."""
         field = self.fields.get(path, InnerTable())
         inner = self.names.get(path, ()) if isinstance(field, InnerTable) and (field.required or is_given) else ()
-        for name in inner:
-            yield from self._gaps(f"{path}.{name}")
-        if not inner and is_required(field):
+        gaps = [gap for name in inner for gap in self._gaps(f"{path}.{name}")]
+        yield from gaps
+        if not gaps and not is_given and is_required(field):
             yield path, ""
 
     def _of_value(self, path: str, field: Any, value: Any) -> str:
