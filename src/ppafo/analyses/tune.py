@@ -65,6 +65,6 @@ def tune(
     problem = tuning if isinstance(tuning, Problem) else load_tuning(tuning, overrides)
     if seed is not None:
         # Noise alone follows the seed of the search; draws of a study keep the seed of the study.
-        effort = problem.effort.model_copy(update={"seed": seed})
+        effort = replace(problem.effort, seed=seed)
         problem = replace(problem, effort=effort, seed=problem.seed if problem.study else seed)
     return solve_tuning(problem, threads, progress, executor_of(executor))
