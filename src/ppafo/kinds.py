@@ -32,10 +32,14 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
 
     ``group`` is the group of entry points, ``word`` the name of a kind in messages, ``kind_type`` the class of the
     kinds. ``own`` maps the names of this package's kinds, in order, to kinds or to their locations, ``module:KIND``.
+    ``of_modules`` is False for kinds that are never found in a module named by the user.
     """
 
-    def __init__(self, group: str, word: str, kind_type: type[Any], own: Mapping[str, Kind | str]) -> None:
+    def __init__(
+        self, group: str, word: str, kind_type: type[Any], own: Mapping[str, Kind | str], of_modules: bool = True
+    ) -> None:
         self.group = group
+        self._of_modules = of_modules
         self.word = word
         self._kind_type = kind_type
         self._places = {name: kind for name, kind in own.items() if isinstance(kind, str)}
@@ -91,7 +95,8 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         self.load_own()
         # A module may be named in two ways, and its components are loaded once.
         loaded = {getattr(kind, "name", name) for name, kind in self._kinds.items()}
-        self._kinds |= {word: kind for word, kind in named_kinds(self._kind_type) if kind.name not in loaded}
+        named = named_kinds(self._kind_type) if self._of_modules else ()
+        self._kinds |= {word: kind for word, kind in named if kind.name not in loaded}
         problems = []
         for point in _entry_points(self.group, _installed_path()):
             try:

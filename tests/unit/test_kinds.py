@@ -12,7 +12,7 @@ import ppafo
 from ppafo import plugins
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.errors import KindError, ScenarioError
+from ppafo.errors import KindError, ParameterError, ScenarioError
 from ppafo.metrics import METRICS
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.studies.study import with_overrides
@@ -106,7 +106,8 @@ def test_what_is_no_law_of_that_name_is_refused(install: Install, text: str, pro
 def test_a_law_is_named_by_module_and_object_from_the_working_folder(
     install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "beside.py").write_text(LAW.format(name="on_off", call="anything"))
+    effect = "from ppafo.model.catalog import EFFECTS\nEFFECT = replace(EFFECTS['joint_load'], name='pull')\n"
+    (tmp_path / "beside.py").write_text(LAW.format(name="on_off", call="anything") + effect)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(plugins, "_named", {})
     monkeypatch.setenv(plugins.VARIABLE, "")
@@ -114,6 +115,9 @@ def test_a_law_is_named_by_module_and_object_from_the_working_folder(
     scenario = ppafo.load_scenario("torque-task-proportional", ["controller.kind=beside:KIND"], plugins=["beside"])
     assert scenario.controller.kind == "beside:KIND"
     assert sys.path == path
+    # An effect is found by its entry point alone.
+    with pytest.raises(ParameterError, match="no effect 'pull'"):
+        load_scenario("torque-task-proportional", ["effects.pull.drag=1 N m s^2/rad^2"])
     plugins.name_modules_in("controller.kind=nowhere:KIND")
     for name, problem in (
         ("nowhere:KIND", "No module named 'nowhere'"),

@@ -51,6 +51,7 @@ EFFECTS: Kinds[Effect] = Kinds(
         "opening": "ppafo.model.effects.opening:EFFECT",
         "bandwidth": bandwidth.EFFECT,
     },
+    of_modules=False,
 )
 """Effects by name. An effect with settings in another part's section is loaded at the start, as no path names it."""
 

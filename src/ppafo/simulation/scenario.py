@@ -4,6 +4,7 @@
 an object of your own control the valve.
 """
 
+import contextlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -434,7 +435,10 @@ class Scenario:
             name = controller.__name__
             raise ScenarioError(f"{self.name}: {name} is a class; give an instance, as in controlled_by({name}())")
         for method in ("reset", "update"):
-            if not callable(getattr(controller, method, None)):
+            found = None
+            with contextlib.suppress(Exception):  # the attributes of a foreign object may raise anything
+                found = getattr(controller, method, None)
+            if not callable(found):
                 kind = type(controller).__name__
                 raise ScenarioError(
                     f"{self.name}: a controller of type {kind} has no method '{method}'; it needs 'reset()' and "

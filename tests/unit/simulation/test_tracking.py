@@ -386,7 +386,6 @@ def test_a_changed_sensor_that_the_controller_does_not_read_is_told_so(law: str)
         (["run.duration=2 ms"], "3 samples are too few"),
         (["run.output_interval=1 s", "reference.ramp_time=20 s"], "4 samples are too few"),
         (["reference.ramp_time=5 h"], "the run ends on the ramp of its reference, with an RMS error of 0.0001"),
-        (["reference.ramp_time=20 s"], "the run ends on the ramp of its reference, with an RMS error of 0.0"),
         (["run.duration=0.9 s"], "the run ends on the ramp of its reference, with an RMS error of 0."),
     ],
 )
@@ -420,14 +419,12 @@ TRIANGLE += ["reference.value_01=0 N m", "reference.value_04=0 N m"]
     [
         (SLOW, [LEVEL, "supply.pressure=20 psi_g"], "20 psi_g the actuator gives at most 2 N m", "supply.pressure"),
         (TASK, [LEVEL, "controller.rate=2 Hz"], "`controller.rate = 2 Hz` gives", "controller.rate=20 Hz"),
-        ("pressure-loop", ["controller.rate=2 Hz"], "`controller.rate = 2 Hz` gives most", "controller.rate=200 Hz"),
         (TASK, [LEVEL, "sensors.delay=200 ms"], "(`sensors.delay = 0.2 s`)", "sensors.delay=20 ms"),
         (TASK, [LEVEL, "sensors.pressure_noise=5 bar_d"], "`sensors.pressure_noise", "sensors.pressure_noise"),
         ("cylinder-servo", ["sensors.delay=2 s"], "`sensors.delay = 2 s`", "sensors.delay=2 ms"),
         ("cylinder-servo", ["sensors.angle_resolution=10 deg"], "`sensors.angle_resolution = 10", "angle_resolution"),
         (TASK, [LEVEL, "valve.area=0.012 mm^2"], "it is too small for this task", "valve.area="),
         (TASK, [*TRIANGLE, *QUICK[:2], "valve.area=0.3 mm^2"], "it is too small for this task", "valve.area=16 mm^2"),
-        (TASK, ["valve.area=0.003 mm^2"], "it is too small for this task", "valve.area=36 mm^2"),
         ("torque-task-solenoid", PARTLY, "it is too small for this task", "valve.area="),
         ("cylinder-servo", ["valve.spool_frequency=3 Hz"], "frequency = 3 Hz` gives most of", "frequency=300 Hz"),
         ("cylinder-servo", ["controller.rate=20 Hz"], "rate = 20 Hz` gives most of the loop's", "rate=1000 Hz"),

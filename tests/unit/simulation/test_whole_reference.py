@@ -113,7 +113,6 @@ def test_limits_move_in_small_steps_with_amplitude_frequency_and_slope(
     ("ramp", "changes", "is_missed"),
     [
         (0.3, ["controller.proportional_gain=0.1 1/(N m)"], True),
-        (0.3, ["valve.area=1 mm^2"], True),
         (0.2, ["controller.proportional_gain=0.2 1/(N m)"], False),
         # A pulse that is shorter than the rest before it leads back to the level of that; the loop oscillates.
         (0.1, ["controller.proportional_gain=3.92 1/(N m)", "sensors.delay=10 ms", "valve.delay=10 ms"], True),
