@@ -124,7 +124,7 @@ def object_of(word: str) -> Any:
     """Return the object of a word ``module:OBJECT``. Raises KindError unless the user named its module."""
     module, _, name = word.partition(":")
     named = {plugin.module: plugin for plugin in named_plugins()}
-    # Who names a package means its modules too.
+    # A package that is named includes its modules.
     parents = [module[:end] for end, character in enumerate(module) if character == "."]
     plugin = next((named[known] for known in (module, *reversed(parents)) if known in named), None)
     if plugin is None and module not in sys.modules:

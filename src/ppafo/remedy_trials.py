@@ -35,7 +35,7 @@ def tried(scenario: Scenario, verdict: "Tracking") -> "Tracking":
     """
     if not verdict.is_useless:
         return verdict
-    # What was changed in Python would be lost with overrides.
+    # Changes made in Python would be lost with overrides.
     is_of_file = replace(reloaded(scenario, ()), run=scenario.run) == scenario
     trials = _trials(scenario, verdict, is_of_file)
     if not trials:
@@ -63,7 +63,7 @@ def _judged(trials: "list[tuple[str, Remedy, Scenario]]") -> "Iterator[tuple[str
     """Yield cause, remedy and verdict of the trials up to the first that follows; not of a run without a verdict."""
     results = of_loaded.simulate_many([_first_strides(changed) for _, _, changed in trials])
     for (cause, remedy, changed), early in zip(trials, results, strict=True):
-        # What follows in the first strides of a walk need not follow in the later ones.
+        # A loop that follows in the first strides of a walk need not follow in the later ones.
         is_early = early.scenario.run.duration < changed.run.duration and early.tracking.passes
         result = of_loaded.simulate_many([changed])[0] if is_early else early
         tracking = result.tracking

@@ -646,7 +646,7 @@ def _paired(found: ComparisonResult, cases: Sequence[ComparedCase], case: Compar
     rows = []
     for metric, pair in case.pairs.items():
         kind, low, high = of_metric(metric, "+.3g"), _percent(pair.change_low), _percent(pair.change_high)
-        # Nothing is a percentage of what is zero within the accuracy of a run.
+        # A value that is zero within the accuracy of a run has no percentage.
         scale = abs(kind.shown_change(base.value(metric)))
         away = kind.shown_change(case.value(metric) - base.value(metric))
         better = "-" if pair.better is None else Kind(form=".4g").interval(pair.better)

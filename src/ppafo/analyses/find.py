@@ -446,7 +446,7 @@ def _panel(found: Threshold, rows: Rows, kind: Kind, of_limit: Kind, met: str) -
 
     values, metric, number, limit = rows["value"], rows["metric"], rows["judged"], found.limit
     if found.condition == FOLLOWS:
-        # What decides whether a run follows is the excess, which has no larger number beside it.
+        # The excess decides whether a run follows; it has no larger number beside it.
         metric = number = rows["excess"]
         of_limit, limit = Kind("Largest tracking number over its limit"), 1.0
     of_grid, is_met, turns = rows["is_of_grid"], rows["is_met"], rows["oscillating"] > 0

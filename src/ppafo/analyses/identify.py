@@ -325,7 +325,7 @@ def _tasks_in_order(reader: _RecordingReader) -> list[_Task]:
             with noted_in(wrong):
                 sources += reader.read(recording, procedure.columns, row_time, gas)
             if wrong and procedure.columns is not None:
-                # What the map lacks is said with what is wrong in it.
+                # Missing channels of the map are said with what is wrong in it.
                 mapped = reader.problem.columns[procedure.columns]
                 names = [name for name in mapped.channels if name != TIME]
                 with noted_in(wrong):
@@ -423,7 +423,7 @@ def finding_of(identification: Identification) -> Finding[Identification]:
         shown = _part(fit, _tolerances(fit.known, before), before)
         parts.append(replace(shown, remarks=[*shown.remarks, *more]))
     written, fitted = new_set.written, new_set.fitted
-    # What holds for this model only is in the set as well, and is never counted with what is identified.
+    # A value that holds for this model only is in the set as well, and is never counted as identified.
     # Other numbers may be identified too, such as the zero of a scale, for which a set has no place.
     count = "no value of the set identified" if fitted else "not written, since no value was identified"
     if written:

@@ -479,7 +479,7 @@ def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) 
     chosen: dict[str, str] = {}
     for metric in with_values:
         rows = [own[metric] for own in results.metrics.values() if own[metric]["count"]]
-        # Nothing is shown by one whose displayed digits are the same in all runs, or that equals another.
+        # A metric with the same displayed digits in all runs, or equal to another, shows no difference.
         if len({_kind(results, metric).text(row[end]) for row in rows for end in ("minimum", "maximum")}) > 1:
             chosen.setdefault(str(rows), metric)
     differing = list(chosen.values()) or with_values[:1] or list(results.document["metrics"])

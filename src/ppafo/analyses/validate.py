@@ -267,7 +267,7 @@ def _why(causes: Diagnosis, without: float, passes: bool) -> str:
     halves this error, or if it concerns wrong samples, which are detectable whatever else is wrong.
     """
     if causes.found is not None:
-        # What is beyond a limit is more than usual, of whatever kind it is.
+        # An error beyond a limit is more than usual, of whatever kind it is.
         said = f"{causes.found.in_words}{', as on any bench' if causes.found.is_usual and passes else ''}"
         same = ", ".join(cause.name for cause in causes.found.same)
         return f"{said} (indistinguishable with these recordings: {same})" if same else said

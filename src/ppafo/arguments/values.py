@@ -238,7 +238,7 @@ def taken_number(
         if isinstance(number, str) and read is not None and not NUMBER.fullmatch(number.strip()):
             return read(taken_text(number))
         if read is not None and carried(value) is not None:
-            # What carries no dimension is no number in SI: a share is one, a mass is not.
+            # Only a dimensionless value is taken without a unit: a share is one, a mass is not.
             return read(f"{number!r} 1")
         is_number = isinstance(number, kind) and not isinstance(number, bool) and math.isfinite(number)
         if not is_number or of(number) not in allowed:
@@ -304,7 +304,7 @@ def _plain(value: Any, path: str, above: tuple[int, ...]) -> Any:
         raise ArgumentError(f"{path} = {shown(value)}: has no value; omit the key for the default")
     if isinstance(scalar, str):
         return str.__str__(scalar)
-    # What contains itself, or is nested deeper than in any file, is refused by the check of the document.
+    # A value that contains itself, or is nested deeper than any file, is refused by the check of the document.
     is_endless = id(value) in above or len(above) > _MAXIMUM_LEVELS
     if is_endless or isinstance(scalar, bytes) or not isinstance(scalar, Iterable):
         return scalar

@@ -43,7 +43,7 @@ complete -o default -F _ppafo ppafo
 
 def completion_script(shell: str) -> str:
     """Return the shell script that completes commands, options and bundled names."""
-    # What may follow the first words of a line; a group after its actions.
+    # Words that may follow the first words of a line; a group after its actions.
     following: dict[str, list[str]] = {}
     for name, entry in COMMANDS.items():
         if isinstance(entry, CommandGroup):

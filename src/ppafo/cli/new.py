@@ -160,7 +160,7 @@ def new(
 
     load = kind_at(chosen.load)
     write_file(path, _content(kind, source, name, path).encode())
-    # What does not load, such as a file with a path relative to another folder, is not left.
+    # A copy that does not load, such as one with a path relative to another folder, is not left.
     try:
         load(path)
     except BaseException:
@@ -204,13 +204,13 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
         return text
     head, rest = text[: named.start()], text[named.end() :]
     if kind == "set" and source is not None:
-        # What the copy changes is shown by 'ppafo sets audit'; what the source changed is not its matter.
+        # 'ppafo sets audit' then shows the changes of the copy, not those of the source.
         parent = source if source in files.names() else os.path.relpath(source, path.parent)
         rest = f"\nparent = {value_text(parent)}{_PARENT_LINE.sub('', rest, count=1)}"
         # Title and notes are of the other device; the citation stays, to which the sources of its values refer.
         title = f"title = {value_text(f'{name}, from {Path(parent).stem}')}"
         rest = _NOTES.sub("", _TITLE_LINE.sub(lambda _: title, rest, count=1), count=1)
-        # What was reported of the other device, and accepted of it, is no evidence on this one.
+        # Numbers reported of the other device, and accepted of it, are no evidence on this one.
         rest = "".join(part for part in _TABLE.split(rest) if not part.startswith(_OF_THE_OTHER))
     text = f'{head}name = "{name}"{rest}'
     # A file of the package shows in its first lines how it is run.

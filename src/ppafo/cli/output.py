@@ -101,7 +101,7 @@ def deliver(answer: Any, as_json: bool, out: Path | None, command: str, *, has_w
 
         write_files(out, files_of(answer), command)
         folder = str(out)
-        # What other commands take, such as the gait of 'ppafo walk --gait'.
+        # Files that other commands take, such as the gait of 'ppafo walk --gait'.
         label = "file to use" if answer.passed else "file, not passed"
         usable_files = [f"{label}: {out / name}" for name in answer.files if name.endswith(".toml")]
         from ppafo.walking.bottle.course import WALKED

@@ -151,7 +151,7 @@ def value_text(value: object) -> str:
     """Format a text, a number, a flag or a list of texts as a TOML value."""
     if isinstance(value, float):
         return repr(float(value))
-    # What JSON escapes in a text is escaped in the same way in TOML, but for DEL.
+    # TOML escapes the characters that JSON does in the same way, but for DEL.
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 

@@ -204,7 +204,7 @@ class Composer(ast.NodeTransformer):
         if not is_made_of(parts):
             raise self.refuse(node, f"'parts={ast.unparse(given.value)}' must be 'parts', or an attribute of it")
         others = [keyword for keyword in node.keywords if keyword is not given]
-        # What a function hands on as it was given by a phase is the same for all of a program.
+        # An argument handed on as a phase gave it is the same in the whole program.
         frame = frame_of(self.function)
         is_own = frame is None or frame.function.__name__ == self.function.__name__
         is_same = is_own and parts is parts_of(self.function)

@@ -185,7 +185,7 @@ class StepText:
         reduction = Reduction(self.module, function, known)
         tree, effects = reduction.reduced(), reduction.effects
         if is_phase:
-            # What nothing has rows for lives in this phase.
+            # A group without rows lives in this phase alone.
             effects.groups = {name: fields for name, fields in effects.groups.items() if name in self.rows}
         if not any(isinstance(node, ast.Return) for node in ast.walk(tree)):
             # A single result is returned as it is.

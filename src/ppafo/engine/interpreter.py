@@ -39,7 +39,7 @@ class PythonProgram:
                 for number, lane in enumerate(lanes.lanes):
                     table[:, number] = _numbers_of(lane, groups)
 
-        # What was written before Python raised is as it was: all is done again from where it began.
+        # Python may raise after some values were written: they are restored, and all is done again from the start.
         before = [array.copy() for array in histories[:2]]
         try:
             run(None)

@@ -305,7 +305,7 @@ def groups_of(program: Program) -> Groups:
         # Linking refuses an effect with a name that is here already.
         **{effect.name: given(effect.parameters) for effect in program.effects},
         **{name: kept(row) for name, row in program.effect_states.items()},
-        # What only some blocks have comes last: its rows are added to those of a run.
+        # Groups that only some blocks have come last: their rows are added to those of a run.
         "course": kept(ReferenceSummary if program.follows_reference else NoParameters),
         **{group: kept(kind.state) for group, kind in program.meter_groups.items()},
     }

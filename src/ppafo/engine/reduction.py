@@ -206,7 +206,7 @@ class Reduction:
         tree.args = ast.arguments([], [ast.arg(name) for name in every], None, [], [], None, [])
         return tree
 
-    # What is known.
+    # Known names and values.
 
     def value_of(self, node: ast.expr) -> Any:
         """Return the value of an expression that depends on known names only, at least one; else ``_UNKNOWN``."""

@@ -203,7 +203,7 @@ def _compose_parameters(composer: Composer, tree: ast.FunctionDef, rows: tuple[s
         arguments.args = sorted(arguments.args, key=lambda argument: argument.arg not in rows)
     for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs):
         argument.annotation = None
-    # What Python calls the function with, whatever the text of the default stands for by now.
+    # The values with which Python calls the function: the text of a default may mean something else by now.
     arguments.defaults = [composer.literal(value, tree, "a default") for value in function.__defaults__ or ()]
     named = function.__kwdefaults__ or {}
     arguments.kw_defaults = [

@@ -96,7 +96,7 @@ _FINE = np.linspace(0.0, 1.0, 1000, endpoint=False)
 def check_side(walk: MeanStride, usual: Gait) -> None:
     """Raise DataError if the ankle is half a stride out of phase with its shank; ``usual`` is a healthy gait."""
     if not STANCE_FRACTION[0] <= walk.stance_share <= STANCE_FRACTION[1]:
-        # Nothing has a place in such a stride, which is refused by itself.
+        # Such a stride is refused by itself: its curves have no usual place.
         return
     shank, _, in_place = _lag(walk, usual, "shank_angle")
     ankle, best, own = _lag(walk, usual, "ankle_angle")

@@ -174,7 +174,7 @@ def conflict_of(runs: FitRuns, rows: Floats, point: Floats, free: Flags, freedom
             ratios = np.where(spread > 1.0e-6 * np.sqrt(variance), moved / np.maximum(spread, 1.0e-300), 0.0)
             most = int(np.argmax(ratios > (1.0 - 1.0e-6) * ratios.max()))
             worst = Conflict(group=name, number=str(names[most]), standard_errors=float(ratios[most]), p=p)
-    # What is stated of a tolerance is a group of its own: its mean parts from the fit by deviation^2 - C.
+    # The stated value of a tolerance is a group of its own: its mean parts from the fit by deviation^2 - C.
     own_variance = 1.0 / np.maximum(prior, 1.0e-300) - variance
     for index in np.flatnonzero((prior > 0.0) & (own_variance >= _PARTING * variance)).tolist():
         ratio = abs(float(shift[index])) / math.sqrt(float(own_variance[index]))
@@ -204,7 +204,7 @@ def _of_family(names: NDArray[np.str_], moved: Floats, root: Floats) -> Conflict
     count = int(tested.sum())
     if not count:
         return None
-    # What is stated is known, and no estimate: so this is chi-square, not F.
+    # Stated deviations are known, not estimated: so this is chi-square, not F.
     p = float(chi2.sf(float(np.sum(np.square(axes.T @ moved)[tested] / known[tested])), count))
     ratios = np.abs(moved) / np.sqrt(np.maximum(1.0 - np.square(root).sum(axis=1), _PARTING))
     most = int(np.argmax(ratios))

@@ -98,7 +98,7 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Qu
     section, _, name = estimate.path.rpartition(".")
     others = {f"{section}.{member}" for form, other in _FORMS if name in form for member in other}
     numbers = {path: old for path, old in parameter_set.numbers.items() if path not in others}
-    # What was fitted as the pressure of both regulators holds for both.
+    # A pressure that was fitted for both regulators holds for both.
     links = acting(links_of_set(parameter_set), {estimate.path})
     numbers |= dict.fromkeys((estimate.path, *(path for path, link in links.items() if link.when)), entry)
     note = f"as {estimate.path} was identified"

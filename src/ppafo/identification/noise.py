@@ -75,7 +75,7 @@ def noise_of(
     drift. Columns are summed in power, as in ``burg``. With ``like``, order and gain are those of that model.
     """
     count, size = sum(map(len, series)), sum(float(np.square(values).sum()) for values in series)
-    # What is less than the floor is the engine's, and no noise.
+    # Residuals below the floor are the engine's, and no noise.
     if size < 0.5 * count:
         return Noise(1.0)
     reflection = burg(series, highest, None if like is None else len(like.reflection))

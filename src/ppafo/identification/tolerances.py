@@ -145,7 +145,7 @@ class Tolerances:
         interval stated in the set; the limit ``held``; the default by kind of parameter.
         """
         gas_law = None if self.gas_law is None else abs(value) * self.gas_law
-        # What was measured on the day counts before what a set says of any day.
+        # A measurement of the day counts before the set's interval for any day.
         of_bench = {"gas.temperature": self.gas_temperature, "gas.molar_mass": gas_law}.get(path)
         if of_bench is not None:
             return deviation_of_limit(of_bench)

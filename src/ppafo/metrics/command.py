@@ -56,7 +56,7 @@ def command_reversals(recording: Recording) -> float:
     command = recording["command"]
     task = recording["controller_phase"] if "controller_phase" in recording else np.zeros(command.size)
     ways = np.where((command > HALF_OPEN) & (command <= VENTS_ABOVE), 1, 0) - np.where(command < -HALF_OPEN, 1, 0)
-    # What begins anew has a number of its own: reversals count between two ways of one number.
+    # Each restart has a number of its own: reversals count between two ways of one number.
     begins = (np.diff(task, prepend=task[:1]) != 0.0) | (command > VENTS_ABOVE)
     number = np.cumsum(begins)
     open_at = np.flatnonzero(ways)

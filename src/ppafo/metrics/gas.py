@@ -22,7 +22,7 @@ def gained(recording: Recording, channels: tuple[str, ...], function: PlainFunct
 
 def gas_imbalance(supplied: Numeric, vented: Numeric, mass_1: Numeric, mass_2: Numeric) -> Numeric:
     """Mass error of a simulation [kg]: supplied minus vented minus stored gas, near 0."""
-    # What leaks goes from one chamber to the other: it leaves neither sum.
+    # Leaking gas goes from one chamber to the other: it leaves neither sum.
     return supplied - vented - (mass_1 + mass_2)
 
 

@@ -373,7 +373,7 @@ def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, late
     before, error, reference = state.part, sample.value - sample.reference, sample.reference
     # From the initial value, or the square of a pressure would hide its change.
     ahead = reference - state.begun
-    # What it has from the parts before, where it is a move after a short rest.
+    # Share of the parts before, for a move after a short rest.
     is_new, joined = course.is_new > 0.0, 1.0 - before.share
     is_first = course.part_start == 0.0 and course.rests == 0.0
     begins = course.start_up > 0.0 and sample.number >= course.start_up and sample.number < course.start_up + 1.0
@@ -392,7 +392,7 @@ def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, late
         reference_total=ahead + (0.0 if anew else before.reference_total),
         lag_squares=lag * lag + (0.0 if anew else before.lag_squares),
         lag_total=lag + (0.0 if anew else before.lag_total),
-        # What motion excuses is no reversal.
+        # A lag that motion excuses is no reversal.
         swing=begun(next_swing(before.swing, error, least + lag), error, anew),
         lag_swing=begun(next_swing(before.lag_swing, late, least), late, anew),
         lowest_error=error

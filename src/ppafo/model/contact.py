@@ -92,7 +92,7 @@ def landing(
     after = FLAT if falls_flat else after
     after = TOE if rises else after
     after = SWING if leaves else after
-    # What the angle has over what the new contact prescribes fades from there, so that the ankle does not jump.
+    # The offset from the angle of the new contact fades from here on, so that the ankle does not jump.
     difference = angle - (now.ankle if keeps_gait > 0.5 else flat_angle) if falls_flat else offset
     difference = angle - now.ankle if rises else difference
     return Landing(contact=after, offset=difference, strikes=1.0 if strikes else 0.0, leaves=1.0 if leaves else 0.0)

@@ -264,7 +264,7 @@ def gait_of(leg: LegParameters, now: GaitMeasured) -> GaitNow:
     carried = torque_of_shank(
         load, sine_shank, cosine_shank, sine_foot, cosine_foot, rate, acceleration, now.knee_forward, now.knee_up
     )
-    # What the measured motion itself takes, with the wearer's own damping.
+    # Torque of the measured motion itself, with the wearer's own damping.
     moving = load.inertia * now.ankle_acceleration + leg.ankle_damping * now.ankle_rate
     return GaitNow(
         phase=now.phase,

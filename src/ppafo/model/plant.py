@@ -253,7 +253,7 @@ class BlendedPort(NamedTuple):
 
 def spool_openings(towards_1: float, towards_2: float) -> Openings:
     """Openings [-] of one spool that opens towards chamber 1 or chamber 2, each 0 to 1. Equation (8)."""
-    # What opens chamber 1 to the source opens chamber 2 to the atmosphere.
+    # The spool that opens chamber 1 to the source opens chamber 2 to the atmosphere.
     return Openings(source_1=towards_1, vent_1=towards_2, source_2=towards_2, vent_2=towards_1)
 
 

@@ -107,7 +107,7 @@ def step_lines(
         lines.relieving,
         step,
     )
-    # What the second regulator passes leaves the first line.
+    # The flow through the second regulator leaves the first line.
     left = taken_1 + passed_2
     passed_1 = regulated_mass(
         set_1 - pressure_1, left * per_mass_1, per_mass_1, lines.droop_1, lines.largest_flow_1, lines.relieving, step

@@ -223,7 +223,7 @@ def with_overrides(parameter_set: ParameterSet, overrides: Iterable[Override], v
         with noted_in(wrong):
             parameter_set = _CHANGES.get(path, _with_number)(parameter_set, path, text)
     raise_noted(wrong)
-    # Who gives a pressure in bar reads pressures in bar; a program gives numbers in SI, and reads nothing.
+    # A user who gives a pressure in bar reads pressures in bar; a program gives numbers in SI, and reads none.
     typed = {
         path: parameter_set.numbers[path]
         for path, override in overrides_by_path.items()
@@ -268,7 +268,7 @@ def _nearest_value(override: Override, allowed: Sequence[str]) -> str:
     # Compared without their section, which all values in it have in common and which makes strangers look alike.
     near = [known.removeprefix(f"{section}.") for known in allowed if known.startswith(f"{section}.")]
     hint = nearest_name(override.typed.removeprefix(f"{section}."), near).replace("'", f"'{section}.", 1)
-    # Nothing is spelt alike: values of the same section stand for what there is.
+    # Where no name is spelt alike, the values of the same section are listed.
     return hint or (f"; '{section}' has {', '.join(near)}" if near else nearest_name(override.typed, allowed))
 
 

@@ -142,7 +142,7 @@ def converter_of(
 
 def count_of(value: float, step: float, top: float) -> int:
     """Return the converter count of a value in the unit of ``step``, rounded and limited to 0 and ``top``."""
-    # What is not negative is rounded by adding a half, in C as in Python.
+    # Adding a half rounds a number of at least 0, in C as in Python.
     return int(max(0.0, min(top, value / step + 0.5)))
 
 

@@ -185,7 +185,7 @@ def draw_panels(
         if fitting == 1:
             panels = _in_one_column(panels, across)
         across = fitting
-        # What only kept a place beside another has none to keep.
+        # A panel that only keeps a place beside another has none to keep in one column.
         panels = [panel for panel in panels if panel.marks or across > 1]
     size = ((width - _EDGES) / across, size[1])
     rows = max(1, -(-len(panels) // across))

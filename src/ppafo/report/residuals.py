@@ -101,7 +101,7 @@ def course_panels(course: FittedCurve, look: str, legend: str, limits: Sequence[
         # The lower one too: axes that are joined later take the limits of the one below them.
         axes.set_xlim(*ends)
         largest = max(map(abs, axes.dataLim.intervaly)) * 1.1
-        # What is left by rounding alone is none.
+        # A residual of rounding alone is none.
         largest = largest if largest > _ROUNDING * float(course.change.values(np.ptp(course.samples))) else 1.0
         axes.set_ylim(-largest, largest)
         axes.locator_params(axis="y", nbins=3)

@@ -44,7 +44,7 @@ def _earlier(folder: Path, name: str) -> dict[str, Any]:
     Raises DataError if the folder was not written by the rig, or if the recording ``name`` would replace a file of
     another origin.
     """
-    # What a killed writer left is no file of others.
+    # A file that a killed writer left behind is the writer's own.
     entries = entries_of(folder) if folder.is_dir() else []
     present = {entry.name for entry in entries if LEFT_ASIDE not in entry.name}
     recordings: Any = {}

@@ -56,7 +56,7 @@ def _value_text(reading: DocumentReader, hardware: Hardware, path: str) -> str |
         return str(written)
     quantity = quantities(reading.document).get(path)
     if quantity is None:
-        # What is not of the scenario is of its device, where the valve has a name.
+        # A number that is not the scenario's is its device's, where the valve has a name.
         full = f"valves.{hardware.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
         entry = hardware.parameter_set.entries().get(full)
         if entry is not None:

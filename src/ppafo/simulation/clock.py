@@ -18,7 +18,7 @@ from ppafo.units.shown import shown_text
 MAXIMUM_STEPS = 1.0e9
 """Largest number of steps of a run."""
 MAXIMUM_OUTPUTS = 5.0e6
-# What is measured during a delay is stored, for each run of an ensemble.
+# Measurements during a delay are stored, for each run of an ensemble.
 MAXIMUM_STEPS_OF_DELAY = 1.0e5
 
 # Up to this fraction times count as equal: decimal ones are seldom whole multiples of each other in binary.

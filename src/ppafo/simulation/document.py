@@ -81,7 +81,7 @@ class DocumentReader:
         try:
             return number_in(value, quantity, atmosphere)
         except UnitError as error:
-            # What decides the unit of a level of the reference or of a gain.
+            # The controlled quantity decides the unit of a level of the reference, and of a gain.
             controlled = controlled_in(self.document)
             is_of = path.startswith("reference.") or (path.startswith("controller.") and controlled != TORQUE)
             of = f"; {REFERENCE_OF} is {controlled!r}" if is_of and "does not fit" in str(error) else ""

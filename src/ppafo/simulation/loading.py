@@ -131,7 +131,7 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
         of_set = (f"device.set={request.file}", f"device.valve={one_line(request.content['default_valve'])}")
         raise ScenarioError(f"{request.file}: is a parameter set, not a scenario; {override_text(of_set)} takes it")
     file, content = request.file, layout.content
-    # What is wrong in the file itself is said as such; what it lacks an override may give.
+    # Faults of the file itself are said as such; an override may give a value that it lacks.
     _check_layout(request.content, request, content, may_have_gaps=bool(request.overrides))
     changed = override_document(request.content, request.overrides, file, content)
     if wrong := list(changed.wrong):

@@ -177,7 +177,7 @@ def moving_together(scenario: Scenario, replaced: Mapping[str, Any]) -> dict[str
 
     Numbers changed since the scenario was loaded no longer follow others.
     """
-    # What follows the sample period follows a rate that is given for it.
+    # Numbers that follow the sample period follow a rate that is given for it.
     period = {_PERIOD: 1.0 / replaced[_RATE]} if _RATE in replaced and _PERIOD not in replaced else {}
     moved, _, _ = _moved(scenario, {**replaced, **period})
     return {path: number for path, number in moved.items() if path not in period}

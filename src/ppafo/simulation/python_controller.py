@@ -29,7 +29,7 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
     """
     run = SampledRun(batch)
     is_framed = run.requests_torque and not reads_gait(controller.update)
-    # What an earlier run left behind in the object must not steer this one.
+    # The object's memory of an earlier run must not steer this one.
     try:
         controller.reset()
     except (NameError, AttributeError, TypeError) as error:

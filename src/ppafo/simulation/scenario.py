@@ -446,7 +446,7 @@ class Scenario:
                 )
         settings = request_settings(self)
         changed = with_control(self, Control(PYTHON_CONTROLLER, settings, self.controller.period, controller))
-        # What a walk requests still follows the device.
+        # The torque that a walk requests still follows the device.
         kept = {path: links for path, links in self.links.items() if path.removeprefix("controller.") in settings}
         return replace(changed, links={**changed.links, **kept})
 

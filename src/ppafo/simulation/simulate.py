@@ -66,7 +66,7 @@ class DeferredResult:
 
     def __call__(self) -> RunMetrics:
         """Return recording and metrics; the same objects at every call."""
-        # What makes them holds all rows of the run, so it is let go once they are made.
+        # The function that makes them holds all rows of the run, so it is let go once they are made.
         if not isinstance(self._measured, RunMetrics):
             self._measured = self._measured()
         return self._measured

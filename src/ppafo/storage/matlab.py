@@ -118,7 +118,7 @@ def _read_older(path: str | Path, contents: _MatlabFile) -> None:
     except (MatReadError, zlib.error) as error:
         raise ValueError(one_line(error)) from error
     for name, value in variables.items():
-        # What MATLAB keeps for its objects has no name of its own.
+        # Data that MATLAB keeps for its objects has no name of its own.
         if name in ("__function_workspace__", "None"):
             # An object says name and class in its first fields.
             names = getattr(getattr(value, "dtype", None), "names", None) or ()

@@ -238,7 +238,7 @@ def netcdf_bytes(recording: Recording, scenario: Mapping[str, Any] | None = None
     import h5netcdf
 
     buffer = io.BytesIO()
-    # Nothing in the file depends on when it was made, so that equal recordings are equal bytes.
+    # The file does not depend on when it was made, so that equal recordings are equal bytes.
     with h5netcdf.File(buffer, "w") as file:
         file.dimensions = {TIME: len(recording)}
         file.attrs.update(global_attributes(recording, scenario))

@@ -63,7 +63,7 @@ def check_can_be_read(path: Path, read: Callable[[str], object], library: str) -
 
 def read_on_trial(reader: str, library: str, path: str) -> int:
     """Read a file on trial. Returns the exit code: 0, ``REFUSED`` with a reason on the output, or ``OUT_OF_MEMORY``."""
-    # What the libraries take themselves does not count.
+    # The memory of the libraries themselves does not count.
     import_module(library)
     read = pkgutil.resolve_name(reader)
     sizes = Path("/proc/self/statm")

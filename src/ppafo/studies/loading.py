@@ -229,7 +229,7 @@ def _build(parsed: StudyFile, document: dict[str, Any], source: _StudySource, ch
     # The noise, which has no [[vary]] table, is a plain number.
     plain = {number.path: "-" for number in drawn}
     given = {path: varied.given for path, varied in varied_paths.items() if varied.given}
-    # What follows a gauge pressure counts from the atmosphere of its run as well.
+    # A number that follows a gauge pressure counts from the atmosphere of its run as well.
     gauge = {path for path, varied in varied_paths.items() if varied.is_gauge}
     return Study(
         name=parsed.name,

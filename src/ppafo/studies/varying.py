@@ -217,7 +217,7 @@ def _level(key: str, value: str | float, varied: VariedPath) -> float:
 def stated_normal(varied: VariedPath, scenario: Scenario) -> tuple[Distribution, str]:
     """Return the stated distribution of a path and its unit in the parameter set; UnitError without an uncertainty."""
     origin, path = scenario.origin, varied.path
-    # What the set reports with the overrides of the scenario: one that replaces a value takes its uncertainty away.
+    # With the overrides of the scenario: one that replaces a value takes its uncertainty away.
     parameters = parameter_set_of(origin)
     inside = f"valves.{origin.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
     entry = parameters.numbers.get(inside)

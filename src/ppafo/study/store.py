@@ -89,7 +89,7 @@ def controller_document(controller: PythonController) -> dict[str, Any]:
     except (TypeError, copy.Error, NotImplementedError, RecursionError):  # it holds what has no copy, such as a port
         fresh = controller
     else:
-        # What a run left behind is no setting: a study resumes with the same object too.
+        # The memory of a run is no setting: a study resumes with the same object too.
         fresh.reset()
     return dict(_plain(fresh, ()))
 
@@ -262,7 +262,7 @@ def manifest(study: Study) -> dict[str, Any]:
         if custom is not None:
             document["controller"]["custom"] = controller_document(custom)
         scenarios[name] = document
-        # What it computes: a law or a valve from a module of the user is a name elsewhere. A line of comment says where
+        # The text of its program: elsewhere a law or a valve from a module of the user is a name. A comment says where
         # a function stands, which may be elsewhere the next time too.
         lines = write_source(plan_run(scenario).program, 1)[1].splitlines()
         code = "\n".join(line for line in lines if not line.startswith("#"))
@@ -273,7 +273,7 @@ def manifest(study: Study) -> dict[str, Any]:
         "ppafo": __version__,
         "study": study.document,
         "scenarios": scenarios,
-        # What is drawn may come from a parameter set, or have been changed in Python, and the file says neither.
+        # Draws may come from a parameter set, or have been changed in Python, and the file says neither.
         "drawn": plain({key: getattr(study, key) for key in ("axes", "drawn", "same", "scores", "sample", "outputs")}),
         "programs": programs,
         **({"overrides": study.changes} if study.changes else {}),
@@ -427,7 +427,7 @@ def compute_chunk(
     for channel in outputs.traces:
         trace = result.traces[channel].T
         trace = trace if trace.size else np.full((part.runs, samples_of(study, configuration)), np.nan)
-        # What bands are read from is kept as it was computed, all else in single precision.
+        # Channels with bands are kept as they were computed, all others in single precision.
         trace = trace.astype(np.float64 if channel in outputs.bands else np.float32)
         summary = f"{CHANNELS[channel].summary}, every {outputs.every:g} s"
         columns[trace_column(channel)] = TableColumn(lists_of(trace), stored_unit(CHANNELS[channel].unit), summary)

@@ -89,7 +89,7 @@ def c_source(
     ``documents`` has the docstrings of rows and functions. ``prelude`` is the name of the file that precedes all
     functions.
     """
-    # What returns nothing but empty rows is never called: an empty value is not written.
+    # A function that returns only empty rows is never called: an empty value is not written.
     functions = [function for function in module if function.returns is None or not is_empty(function.returns)]
     names: dict[str, str] = {}
     if reading is not None:
@@ -287,7 +287,7 @@ class _Body:
         """Yield the lines of a statement, including nested blocks."""
         match statement:
             case typed.Assign():
-                # What nobody reads is not written: a compiler would warn of it.
+                # A name that is never read is not written: a compiler would warn of it.
                 if statement.name in self.scopes.read and not is_empty(statement.value.type):
                     starts = self.scopes.first.get(id(statement), "")
                     declared = f"{starts}{self.writer.type_name(statement.value.type)} " if starts else ""

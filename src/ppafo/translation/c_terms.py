@@ -191,7 +191,7 @@ class CTerms:
             return ""
         arguments = [self.term(part) for part in term.parts if not is_empty(part.type)]
         if term.kind == "part":
-            # What each first place has: the product of the further extents.
+            # Size of an element of the first dimension: the product of the further extents.
             assert isinstance(term.type, Array)
             sizes = (f"{arguments[0]}.extent[{at}]" for at in range(1, term.type.dimensions))
             arguments.append(" * ".join(sizes) or "1")

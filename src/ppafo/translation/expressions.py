@@ -352,7 +352,7 @@ class Expressions:
         # Defaults first, then arguments by place, then by name: the last one holds.
         values |= dict(zip(names, map(self.term, node.args), strict=False))
         values |= {str(keyword.arg): self.term(keyword.value) for keyword in node.keywords}
-        # What functions call each other with is known since they were composed; this is a call of the engine's own.
+        # Calls between functions were checked when they were composed; this is a call of the engine's own.
         missing = [name for name in names if name not in values]
         if missing or len(node.args) > len(positional) or len(values) > len(names):
             problem = f"missing a required argument: '{missing[0]}'" if missing else "too many arguments"

@@ -115,7 +115,7 @@ def needed(body: Block, after: frozenset[str], leaving: frozenset[str] = frozens
     live = after
     # Backwards, so that what is read later is known.
     for statement in reversed(body):
-        # What nobody reads later needs no assignment: expressions have no other effect.
+        # A name that is not read later needs no assignment: expressions have no other effect.
         if isinstance(statement, typed.Assign) and statement.name not in live:
             continue
         if isinstance(statement, typed.If):
@@ -123,7 +123,7 @@ def needed(body: Block, after: frozenset[str], leaving: frozenset[str] = frozens
             kept.append(replace(statement, body=yes, otherwise=no))
             live = read | others | _names_of(statement)
         elif isinstance(statement, typed.CountedLoop | typed.While):
-            # What one iteration leaves may be read by the next: again until no further name is found to be read.
+            # An iteration may read names that the one before left: repeat until no further name is read.
             live |= _names_of(statement)
             turn, read = needed(statement.body, live, live)
             while not live >= read:
@@ -200,7 +200,7 @@ class ScopeNames:
         named = [node for node in nodes if isinstance(node, ast.Name)]
         every = {node.id for node in named}
         read = {node.id for node in named if isinstance(node.ctx, ast.Load)}
-        # What counts holds nothing but the numbers of loops that count up from 0 or more.
+        # A counting variable holds only the numbers of loops that count up from 0 or more.
         loops = [node for node in nodes if isinstance(node, ast.For) and _counts_up(node)]
         counting = [node.target.id for node in loops if isinstance(node.target, ast.Name)]
         stored = [node.id for node in named if isinstance(node.ctx, ast.Store)]

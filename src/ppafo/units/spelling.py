@@ -113,7 +113,7 @@ _GASES = {name.lower(): mass for name, mass in MOLAR_MASSES.items()}
 _AS_AIR = 5.0e-3
 """Relative deviation from the molar mass of air [-] within which a gas counts as air."""
 _QUANTITY = re.compile(r"\s*([+-]?\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?)\s*(\S.*?)\s*")
-# What stands behind bar (abs) or kgf/cm^2 (g) is no condition.
+# Words behind a unit, as in bar (abs) or kgf/cm^2 (g), are no condition.
 _BEHIND = re.compile(
     rf"(?P<flow>.*[^/ ]) *\((?!(?i:{_KIND_WORD})\.?\))(?P<words>[^()]*)\)|(?P<bare>.*[^/ ])[ _]+(?P<name>ANR)"
 )

@@ -458,7 +458,7 @@ class CauseSearch:
         for cause, slope in slopes:
             across = slope - (along_first @ slope) * along_first
             across_square = float(across @ across)
-            # What does the same as the first leaves rounding, along which anything may seem to be explained.
+            # A cause with the effect of the first leaves rounding, along which anything may seem to be explained.
             if across_square > _PARTING * float(slope @ slope):
                 along = float(across @ rest)
                 explained = along * along / across_square
@@ -475,7 +475,7 @@ class CauseSearch:
         """
         explaining = [cause for cause in tried if cause.explains]
         first = max(explaining, key=lambda cause: cause.gain)
-        # What has no size of its own to fit, a swap or a sign, cannot pass for two other changes.
+        # A cause without a size to fit, a swap or a sign, cannot pass for two other changes.
         is_fitted = first.has_size and not first.is_of_samples
         # One Jacobian, at the first cause, shows what a second one would add and what could replace it.
         slopes = self.slopes(first.fitted, first.residuals.errors, sized) if is_fitted else []
@@ -506,7 +506,7 @@ class CauseSearch:
 
     def unexplained(self, tried: Sequence[Cause], kinds: str) -> Diagnosis:
         """Return the diagnosis without a cause, with the best of the causes ``tried``, of the ``kinds`` in words."""
-        # What is wrong with samples is seen in them, whatever else is wrong; a misread unit is no hint beside others.
+        # Wrong samples are seen in themselves, whatever else is wrong; a misread unit is no hint beside others.
         hinting = [cause for cause in tried if not cause.is_of_unit and (cause.gain > 0.0 or cause.is_of_samples)]
         hints = sorted(
             (replace(cause, left=left) for cause, left in zip(hinting, self.left_by(hinting), strict=True)),

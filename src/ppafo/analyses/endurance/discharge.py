@@ -270,7 +270,7 @@ def _end(
     is_pressure = pressure_margin <= flow_margin
     short = "maintain the supply pressure" if is_pressure else "drive the largest flow through the regulator"
     why = f"its pressure is too low to {short}"
-    # What a warm bottle would still give decides between the two: cold is mended by waiting, empty is not.
+    # The gas of a warm bottle decides between the two: cold is mended by waiting, empty is not.
     if usable > _NEXT_TO_NOTHING * bottle.mass:
         return "too cold", f"the bottle is too cold: {why}; {remaining}, {warm}"
     return "empty", f"the bottle is empty: {why}, even at room temperature; {remaining}"
@@ -567,7 +567,7 @@ def _facts(endurance: Endurance) -> list[tuple[str, str]]:
     """Return the most important results of a discharge as pairs of name and value."""
     mass, flow, pressure = (Kind(quantity=name, form=".3g").text for name in ("gas mass", "mass flow", "pressure"))
     recording, full, counted = endurance.recording, endurance.bottle, endurance.counted
-    # What warms the gas of the full bottle to the room's temperature behind the regulator.
+    # Heat that warms the gas of the full bottle to the room's temperature behind the regulator.
     content = bottle_content(full.fluid.table, full.mass, full.volume, full.room_temperature)
     heat = heat_to_warm(full.fluid.table, content, full.room_temperature, full.regulator.set_pressure)
     of_device = ", the supply pressure of the device" * (full.entries[SET_PRESSURE].origin == "derived")

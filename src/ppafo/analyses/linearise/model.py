@@ -526,7 +526,7 @@ def equilibrium(scenario: Scenario) -> Point:
         raise refusal(f"there is no equilibrium, because the torque accelerates the vane at {degrees:.4g} deg")
     # A valve that is closed but for rounding is closed.
     steady |= {name: 0.0 for name in ("command", *_openings_in(steady)) if abs(steady[name]) < _STEADY}
-    # What the valve takes from its command at once was no unknown.
+    # States that the valve takes from its command at once were no unknowns.
     at_rest = numbers(plant.valve(steady)[0])
     return Point(None, steady | dict(zip(valve_states(run.program), at_rest, strict=True)), None if is_held else 0.0)
 
@@ -600,7 +600,7 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     # Slopes of rates and outputs on the side of ``side_of`` and on the other side, and estimates of their errors.
     near, near_errors = np.stack([slopes(name, sides[name]) for name in columns], axis=-1)
     far, far_errors = np.stack([slopes(name, -sides[name]) for name in columns], axis=-1)
-    # What the valve takes from its command at once is no state: nothing but the output that shows it asks for it.
+    # A value that the valve takes from its command at once is no state: only the output that shows it needs it.
     rows = [*(f"rate of {state}" for state in rates_here), *outputs_here]
     # A second chamber that the actuator lacks stays at the atmosphere, without any slope.
     idle = [name for name in rates_here if run.program.has_one_chamber and name in OF_SECOND_CHAMBER]

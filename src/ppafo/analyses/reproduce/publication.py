@@ -157,7 +157,7 @@ def _checked(entry: ClaimEntry, citation: str, where: str) -> Claim:
     low, high = claim.limits
     if low > high:
         raise ScenarioError(f"{where}: at_least = {low:g} must not exceed at_most = {high:g}")
-    # What is published has to agree with itself: else the range was typed wrongly.
+    # A published number lies in its own range: else the range was typed wrongly.
     if entry.published is not None and not low <= entry.published <= high:
         limit = f"at_least = {low:g}" if entry.published < low else f"at_most = {high:g}"
         raise ScenarioError(f"{where}: published = {entry.published:g} is outside {limit}; widen the range")

@@ -233,7 +233,7 @@ def _assumed_in(scenario: Scenario) -> Iterator[AssumedValue]:
         is_set_here = entry.source == OVERRIDE
         is_of_file = is_set_here and file_set.numbers.get(path) == entry
         if path not in settled and not (is_of_other or is_of_paper or is_of_file):
-            # What was set for this run says what it replaces.
+            # A number set for this run says which one it replaces.
             reason, source = (f"set for this run; {entry.note}", "") if is_set_here else (entry.note, entry.source)
             yield AssumedValue(path, declared[path].summary, entry_text(entry), entry.origin, reason, source)
 

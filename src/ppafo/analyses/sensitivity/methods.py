@@ -179,7 +179,7 @@ def _shapley_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
     free = places[:, None, :] <= np.arange(count - 1)[None, :, None]
     for pattern in np.unique(free.reshape(-1, count), axis=0):
         rows = np.all(free == pattern, axis=2)
-        # What gives scores of free values from fixed ones: a matrix for the mean, a factor for the rest.
+        # Scores of free values from fixed ones: a matrix for the mean, a factor for the rest.
         across = covariance[np.ix_(pattern, ~pattern)]
         mean = np.linalg.solve(covariance[np.ix_(~pattern, ~pattern)], across.T).T
         factor = np.linalg.cholesky(covariance[np.ix_(pattern, pattern)] - mean @ across.T)

@@ -41,7 +41,7 @@ def profile_torque(profile: TorqueProfile, phase: float) -> float:
     return profile.peak_torque * (rise - fall)
 
 
-# What is asked for is a prescription for a wearer, not a number of the device: by default that of the paper, whatever
+# The requested torque is a prescription for a wearer, not a number of the device: by default the paper's, whatever
 # the actuator could give. Only the limit of it follows the device.
 
 HOLD_QUANTITIES = (

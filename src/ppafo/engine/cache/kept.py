@@ -85,7 +85,7 @@ def is_whole(folder: Path) -> bool:
     """Return whether all files of a program folder have their recorded hashes."""
     try:
         stated = json.loads(read_regular_file(folder / CHECKSUMS))
-        # What else lies there is no part of it.
+        # Other files in the folder are no part of it.
         files = stated.items() if isinstance(stated, dict) else ()
         names = [name for name, _ in files]
         return (

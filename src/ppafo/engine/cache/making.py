@@ -60,7 +60,7 @@ def _lock(lock_file: Path) -> int | None:
             return None
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            # Who had it before may have removed it in the meantime: then others lock another file of this name.
+            # The last holder may have removed it in the meantime: then others lock another file of this name.
             if os.path.samestat(os.fstat(descriptor), os.lstat(lock_file)):
                 return descriptor
         except BlockingIOError:

@@ -84,7 +84,7 @@ class Lane:
     classes.
     """
 
-    # What a run is made of, and does not change: parameters.
+    # Parameters, which a run does not change.
     timing: LaneTiming
     plant: Any  # of the actuator: at least the fields of ``PlantParameters``
     thermal: "ThermalParameters"
@@ -117,7 +117,7 @@ class Lane:
     command_history: NDArray[np.float64]
     trace: NDArray[np.float64]
 
-    # What a step hands to the next one, and its phases to later ones.
+    # Values that a step hands to the next one, and a phase to later ones.
     held: "HeldChambers"  # chambers as the step begins
     carried: "CarriedFoot"  # torques of leg and device on the foot as the step begins
     place: "GaitPlace"  # where the gait is at the end of the step,
@@ -143,7 +143,7 @@ class Lane:
     before: float  # what of the step was before the part [s]
     remaining: float  # what is left of the step from the part's begin on [s]
 
-    # What lives inside one phase.
+    # Values inside one phase.
     second: Any  # second stage of the gas, by its kind
     fed: "PlantState"  # the state with the gas of the step, but the vane as it was
     warmed: Any  # true masses with the gas of the step

@@ -56,7 +56,7 @@ def advance(
     if parts.leg is not None:
         for lane in lanes:
             parts.leg.carry(parts, lane)
-    # Nothing is kept of samples for which there is no room, and where neither meters nor traces look at them.
+    # Samples without room in the record are not kept where neither meters nor traces read them.
     last = last_record if parts.takes_samples else lanes.records.shape[0] - 1
     due = next_record * interval
     beyond = first_step + step_count

@@ -52,7 +52,7 @@ def make_sample(parts: Program, lane: Lane, elapsed: float, index: int, interval
         torque=torque,
         command=lane.result.command,
         value=parts.controlled_value(lane.state.angle, pressure_1, pressure_2, torque),
-        # That of a reference with parts has been evaluated for the course.
+        # The course has evaluated a reference with parts already.
         reference=lane.course.previous if parts.cuts_reference else set_point_at(parts, lane, time),
         temperature_1=temperature(lane.thermal, lane.state.mass_1, lane.masses.mass_1) if parts.is_thermal else 0.0,
         temperature_2=temperature_of_chamber_2(parts, lane) if parts.is_thermal else 0.0,

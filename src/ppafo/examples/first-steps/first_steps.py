@@ -18,7 +18,7 @@ scenario = ppafo.load_scenario("torque-task-proportional")
 print(scenario.description)
 print(f"valve area {scenario.device.valve.area * 1e6:.1f} mm^2, duration {scenario.run.duration} s")
 
-# What the paper does not say is marked as assumed, with the reason.
+# Values that the paper does not state are marked as assumed, with the reason.
 print(f"{len(scenario.assumptions)} assumed values, for example:")
 print(f"  {scenario.assumptions[1].path} = {scenario.assumptions[1].value}: {scenario.assumptions[1].note}")
 

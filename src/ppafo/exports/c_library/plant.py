@@ -260,7 +260,7 @@ def _commanded(_motion: Motion, scenario: Scenario) -> Scenario:
         description=f"Plant without controller of this scenario: {scenario.description}",
         run=replace(scenario.run, step=step, output_interval=step),
         controller=Control("constant", {"command": 0.0}, step),
-        # What a sensor sees reaches nothing here, but when it looks divides a step of the engine, and so does its lag.
+        # Sensor readings are not used here, but their times divide a step of the engine, and so does their lag.
         sensors=Sensors(
             delay=scenario.sensors.delay,
             angle_bandwidth=scenario.sensors.angle_bandwidth,

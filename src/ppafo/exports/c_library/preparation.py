@@ -170,7 +170,7 @@ def set_plant(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
         shape = parts.program.actuator.prepare(
             section_row(parts.actuator_settings, settings, "actuator"),
             stops,
-            # What came from a file that the set names is constant.
+            # Tables from a file that the set names are constant.
             *(parts.constant(table) for table in tables),
         )
         # The mean growth is taken at the supply's pressure, at which most of the work is done.

@@ -190,7 +190,7 @@ def _names_around() -> frozenset[str]:
         for folder in folders
         if folder.is_dir()
     ]
-    # What is around a library has the name of that library in it.
+    # Functions around a library have the name of that library in theirs.
     found = (
         _FUNCTION.findall(text)
         for of_folder in texts

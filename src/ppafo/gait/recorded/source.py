@@ -147,7 +147,7 @@ def walk_signals(
             signal = replace(signal, columns=tuple(column for _, column in found.terms))
             walk[name] = with_absence(signal) if name in LOADS else without_ends(signal)
         if isinstance(mapped, ShankMap) and found is not None and name in walk:
-            # Nothing else that is wrong matters in what is no walk.
+            # In a recording that is no walk, other faults do not matter.
             check_walks(walk[name], found, mapped)
     with noted_in(wrong):
         knee = {} if columns.knee is None else knee_signals(columns.knee, tables, stature, "knee" not in required)

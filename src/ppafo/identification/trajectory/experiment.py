@@ -336,7 +336,7 @@ def number_of(parameter: FitNumber, experiments: Sequence[FittedExperiment]) -> 
     path = paths.pop()
     quantity = [declaration_of(path, scenario) for scenario in scenarios][-1]
     for experiment in experiments:
-        # What the run follows as it was recorded no number moves.
+        # No number moves an input that the run follows as it was recorded.
         followed = dict.fromkeys(supply_paths(experiment.scenario.device), SUPPLY)
         if DORSIFLEXION_SUPPLY in experiment.inputs:
             followed["plant.dorsiflexion_pressure"] = DORSIFLEXION_SUPPLY

@@ -698,7 +698,7 @@ def expected_information(fit: TrajectoryFit, candidates: Sequence[CandidateExper
 def _benefit(fit: TrajectoryFit, candidate: CandidateExperiment) -> ExpectedBenefit:
     """Return the expected benefit of a candidate, from its whitened Jacobian added to the information of the fit."""
     noise = dict(candidate.noise) or {name: model.deviation for name, model in fit.fit.sensors.items()}
-    # What belongs to one recording, such as its trigger, another experiment says nothing of.
+    # Another experiment says nothing of a number of one recording, such as its trigger.
     common = [index for index, number in enumerate(fit.numbers) if not number.recordings]
     slopes = _slopes(candidate, noise, [fit.numbers[index] for index in common], fit.fit.values[common])
     blocks = []

@@ -205,7 +205,7 @@ def check_filling(evidence: Evidence) -> Iterator[AuditFinding]:
     )
 
 
-# What does the rounding of a measured table leave unknown of the torque?
+# Torque that the rounding of a measured table leaves unknown.
 
 _FELT_TORQUE = 0.01
 """Standard deviation of the torque, relative to the largest one [-], from which a rounded table is a warning."""

@@ -51,7 +51,7 @@ def changes(parameter_set: ParameterSet, parent: ParameterSet) -> list[ValueChan
     for path in dict.fromkeys((*after, *before)):
         new, old = after.get(path), before.get(path)
         if new is None and path.startswith("reported."):
-            # What was reported of one device is no property that another could lack.
+            # A number reported of one device is no property that another could lack.
             continue
         if new is None or old is None or not _is_same(path, parameter_set, parent):
             was = "" if old is None else entry_text(old)

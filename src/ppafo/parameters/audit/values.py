@@ -247,7 +247,7 @@ def check_dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
         value = 0.0
         with contextlib.suppress(UnitError):
             value = to_si(entry.value, entry.unit, inverse_unit)
-        # What is 0 has no inverse, whatever its unit.
+        # A value of 0 has no inverse, whatever its unit.
         if value == 0.0:
             foreign[path] = why
             continue

@@ -68,7 +68,7 @@ def read_publication(name_or_path: str | Path) -> tuple[PublicationFile, str]:
     twice = first_twice(entry.id for entry in read.claims)
     if twice is not None:
         raise ScenarioError(f"{file}: claims: '{twice}' appears twice")
-    # What one field alone cannot say: these are rules between fields.
+    # Rules between fields, which the declaration of one field cannot state.
     for entry in read.claims:
         where = f"{file}: claims.{entry.id}"
         if entry.published is None and not entry.words and not entry.own:

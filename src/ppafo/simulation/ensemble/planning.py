@@ -39,7 +39,7 @@ class _ValidRuns:
     def scenario(self) -> Scenario:
         """Scenario with columns for the remaining runs, built once for all rules."""
         if self._scenario is None:
-            # What the clock came to stands in the place of the times that were given.
+            # The times that the clock computed replace those that were given.
             numbers = {path: column for path, column in self.columns.values.items() if path not in TIMES}
             scenario, clock = with_numbers(self.columns.base, numbers), self.clock
             if clock is not None:

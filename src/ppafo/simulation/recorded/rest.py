@@ -53,7 +53,7 @@ def start_of(recording: Recording, device: Device, known: Mapping[str, float], f
     """
     count, values = samples_at_rest(recording), dict(known)
     if device.actuator.has_one_chamber and "pressure_2" not in recording:
-        # Nothing that is recorded depends on the dead volume behind the other port.
+        # No recorded channel depends on the dead volume behind the other port.
         values.setdefault("pressure_2", device.supply.atmospheric_pressure)
     for name in (ANGLE, "pressure_1", "pressure_2", "angular_velocity"):
         if name not in values and name in recording:

@@ -502,7 +502,7 @@ def _not_settled(case: Case) -> TrackingCause:
 
 CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     _opened_away,
-    # What lacks more than the reach takes has another cause before it.
+    # A larger lack than the reach explains has another cause before it.
     lambda case: torque_beyond_reach(case) if case.is_for_reach else None,
     load_beyond_reach,
     below_lowest_set_pressure,

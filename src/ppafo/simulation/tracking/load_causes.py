@@ -137,7 +137,7 @@ def torque_beyond_reach(case: Case) -> TrackingCause | None:
     supply = supply_that_moves(device, worst.upwards)
     stop = stop_of(scenario, case.recording["angle"][case.samples]) if isinstance(scenario.motion, FreeMotion) else ""
     lies = f"only the {stop} stop, on which the joint lies, resists the torque: " if stop else ""
-    # What always pushes gives least where its chamber is vented.
+    # An actuator that only pushes gives least where its chamber is vented.
     pushes = worst.reach > 0.0 and not worst.upwards
     filled = float(device.lowest_pressure if pushes else device.highest_pressures[supply != PRESSURE_PATH])
     text = (
@@ -205,7 +205,7 @@ def load_beyond_reach(case: Case) -> TrackingCause | None:
     advice = ""
     is_one_way = abs(reach) <= ONE_WAY * max(abs(lowest), abs(highest))
     if is_one_way or (needed is None and not outside):
-        # What its material pulls back is too little, and no pressure gives more.
+        # The pull of its material is too little, and no pressure gives more.
         text = f"{text}: it acts in one direction only" if is_one_way else text
         advice = "add a spring or a weight that pulls the joint back"
         back = reach + (1.5 if not is_high else -1.5) * holding + _PULLED_BACK * (highest + lowest)

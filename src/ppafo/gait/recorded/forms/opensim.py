@@ -175,7 +175,7 @@ def opensim_convention(table: MotionTable, side: Side, _body_mass: float) -> Con
         counts_above = flexion is not None and bool(np.nanmax(flexion) > -np.nanmin(flexion))
         terms.append(f"-{name}" if counts_above else name)
     maps: dict[str, Any] = {"shank_angle": ShankMap(terms=tuple(terms))}
-    # What this package writes for OpenSim beside its coordinates (``storage/opensim.py``) is read as it is.
+    # Columns that this package adds to the coordinates of OpenSim (``storage/opensim.py``) are read as they are.
     if f"shank_angle_{side[0]}" in table.columns:
         maps["shank_angle"] = ShankMap(terms=(f"shank_angle_{side[0]}",))
     if {"knee_forward", "knee_up"} <= set(table.columns):
