@@ -8,7 +8,7 @@ from typing import Any, get_args
 from ppafo.arguments import checked
 from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import TomlKind, label, value_text
-from ppafo.errors import DataError
+from ppafo.errors import DataError, refused_as
 from ppafo.gait.gait import BODY_MASSES, CURVES, REQUIRED, SPEEDS, STATURES, Gait, GaitCurve, Origin, plain_unit
 from ppafo.gait.plausible import check_gait
 from ppafo.model.declaration import Number, Quantity
@@ -115,20 +115,17 @@ def parse_gait(content: bytes, file: str) -> Gait:
 
 
 def _curve(table: dict[str, Any], name: str, file: str) -> GaitCurve:
-    # The layout has each list by itself; that both agree is said here.
-    if len(table["cosine"]) != len(table["sine"]):
-        counts = f"{len(table['cosine'])} numbers in cosine and {len(table['sine'])} in sine"
-        raise DataError(f"{file}: {name} has {counts}; both lists must have the same length")
-
     def si(value: float) -> float:
         return to_si(float(value), plain_unit(table["unit"]), plain_unit(CURVES[name]))
 
-    return GaitCurve(
-        si(table["mean"]),
-        tuple(map(si, table["cosine"])),
-        tuple(map(si, table["sine"])),
-        si(table.get("deviation", 0.0)),
-    )
+    # The layout has each list by itself; that both agree is said here.
+    with refused_as(DataError, f"{file}: {name}", DataError):
+        return GaitCurve(
+            si(table["mean"]),
+            tuple(map(si, table["cosine"])),
+            tuple(map(si, table["sine"])),
+            si(table.get("deviation", 0.0)),
+        )
 
 
 def json_schema() -> dict[str, Any]:

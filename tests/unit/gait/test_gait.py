@@ -91,7 +91,11 @@ def test_the_shipped_gaits_fit_the_published_schema() -> None:
             'body_mass = "heavy"',
             "subject.body_mass = 'heavy': 'heavy' does not start with a number",
         ),
-        ("cosine = [20.60635, ", "cosine = [", "shank_angle has 5 numbers in cosine and 6 in sine"),
+        (
+            "cosine = [20.60635, ",
+            "cosine = [",
+            "shank_angle: a Fourier series needs as many cosines as sines, not 5 cosines and 6 sines",
+        ),
         ('unit = "N m/kg"', 'unit = "N m"', r"ankle_moment.unit = 'N m' is not allowed; allowed: N m/kg"),
         ('origin = "measured"', 'origin = "guess"', "origin = 'guess' is not allowed"),
     ],

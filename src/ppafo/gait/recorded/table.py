@@ -146,7 +146,11 @@ MOST_ACCELERATION = 50.0
 """Acceleration [m/s^2] that a marker on a leg does not reach when it starts to move from rest."""
 _COARSE = 5.0e-5
 """Least difference of coordinates [m] from which rounding may repeat the position of a marker at rest."""
-_LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+
+
+def metres_in(table: MotionTable, column: str) -> float:
+    """Return the unit of a column [m]; most laboratories write mm, also where the file does not say so."""
+    return {"m": 1.0, "cm": 0.01}.get(table.units.get(column, ""), 0.001)
 
 
 def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTable:
@@ -164,8 +168,7 @@ def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTabl
         own = [f"{label}.{axis}" for axis in AXES if f"{label}.{axis}" in columns]
         if len(own) < 2:
             continue
-        # Most laboratories write millimetres, also where the file does not say so.
-        at = np.array([columns[name] for name in own]) * _LENGTHS.get(table.units.get(own[0], ""), 0.001)
+        at = np.array([columns[name] for name in own]) * metres_in(table, own[0])
         recorded, zero = np.isfinite(at).all(axis=0), (at == 0.0).all(axis=0)
         causes = {
             "not recorded": ~recorded,

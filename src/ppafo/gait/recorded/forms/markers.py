@@ -21,7 +21,7 @@ from ppafo.gait.recorded.mapping import (
     Vertical,
     unsaid_axes,
 )
-from ppafo.gait.recorded.table import MotionTable
+from ppafo.gait.recorded.table import MotionTable, metres_in
 from ppafo.signals.recording import Floats
 
 PLATE = "force plate "
@@ -134,18 +134,13 @@ def _check_forward(table: MotionTable, columns: GaitMap, foot: str, labels: Sequ
             why = f"{toe!r} is behind {heel!r} along it"
         elif way is not None and np.isfinite(way).any():
             seen = way[np.isfinite(way)]
-            is_reversed = sign * float(seen[-1] - seen[0]) < -_LEAST_WAY * _per_metre(table, f"{shank.ankle}.{axis}")
+            is_reversed = sign * float(seen[-1] - seen[0]) < -_LEAST_WAY / metres_in(table, f"{shank.ankle}.{axis}")
             why = f"{shank.ankle!r} travels against it"
         if is_reversed:
             other = axis if sign < 0.0 else f"-{axis}"
             raise DataError(
                 f"{table.file}: {name}.forward = {mapped.forward!r} is reversed: {why}; the axis is {other!r}"
             )
-
-
-def _per_metre(table: MotionTable, column: str) -> float:
-    """Return the units of a column per metre; most laboratories write mm, also where the file does not say so."""
-    return {"m": 1.0, "cm": 100.0}.get(table.units.get(column, ""), 1000.0)
 
 
 def _recorded_labels(table: MotionTable) -> list[str]:
@@ -222,7 +217,7 @@ def _axes(
         shoe = at_toe - at_heel
         both = np.isfinite(shoe).all(axis=0)
         pointing = shoe[:, both].mean(axis=1) if both.any() else None
-    if np.hypot(*np.delete(travel, up)) < _LEAST_WAY * _per_metre(table, f"{ankle}.x"):
+    if np.hypot(*np.delete(travel, up)) < _LEAST_WAY / metres_in(table, f"{ankle}.x"):
         if pointing is None:
             return "x" if up else "y", _UPWARDS[up], ()
         travel = pointing
