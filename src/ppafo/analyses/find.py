@@ -337,18 +337,25 @@ def judged(
 
 
 def _verdict(base: Scenario, path: VariedPath, value: float, has_remedy: bool) -> str:
-    """Return value [SI] and verdict of its run, with the remedy if asked."""
+    """Return value [SI] and verdict of its run, a torque beyond the actuator's included, with the remedy if asked."""
     from ppafo.remedy_trials import tried
     from ppafo.running import simulate
+    from ppafo.simulation.declaration import changes_reach
     from ppafo.simulation.tracking.remarks import standing_still
+    from ppafo.simulation.tracking.remedies import change_text
+    from ppafo.simulation.tracking.rule import CRITERION_TEXTS, shortfall
     from ppafo.studies.study import with_overrides
 
     # Given in the unit of the range, the value and what is said of it are in that unit.
     result = simulate(with_overrides(base, [f"{path.path}={path.quote(value, '.17g')}"]))
     # The remedy that succeeds decides between possible causes.
     verdict = tried(result.scenario, result.tracking)
+    lacking = float(shortfall(result.scenario).max())
     said = verdict.sentence
-    if verdict.fails and not has_remedy:
+    # What follows by what the limits allow, but is no value to be found.
+    if not verdict.fails and lacking > 0.0 and changes_reach([path.path]):
+        said = f"{CRITERION_TEXTS['reach']} {change_text(result.scenario.controlled, lacking)}"
+    elif verdict.fails and not has_remedy:
         intended = f"intended: {verdict.accepted}" if verdict.accepted else ""
         said = "; ".join(filter(None, (verdict.found, verdict.cause, intended)))
     said = "; ".join(filter(None, (said, standing_still(result, not verdict.fails))))

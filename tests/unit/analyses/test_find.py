@@ -226,6 +226,8 @@ def test_a_run_that_follows_is_a_condition_of_its_own() -> None:
     for value, follows in ((answer.found.value, True), (answer.found.not_met_at, False)):
         run = ppafo.simulate(TASK, [*task, f"controller.proportional_gain={value!r} 1/(N m)"])
         assert (run.tracking.follows is True) == follows
+    beyond = find(TASK, vary="supply.pressure=30..60 psi_g", such_that="follows", grid=5, overrides=task[:1]).found
+    assert any("exceeds the largest available torque by" in said for said in beyond.remarks)
     with pytest.raises(StudyError, match="'follows' needs a reference"):
         find("step-response", vary="supply.pressure=50..60 psi_g", such_that="follows")
     with pytest.raises(StudyError, match="or 'follows'"):
