@@ -262,8 +262,8 @@ class FieldLayout:
                 own = {at: of} if isinstance(of, Field) else inside(at, of(item if isinstance(item, Mapping) else {}))
                 yield from layout_of(own, self.reads_numbers)._inside(at, item)
         elif isinstance(field, Many):
-            count, names = f"{field.least} or more " * (field.least > 0), ("numbers", "texts", "tables")
-            what = names[[isinstance(field.of, Quantity), isinstance(field.of, Words), True].index(True)]
+            count = f"{field.least} or more " * (field.least > 0)
+            what = {Quantity: "numbers", Words: "texts"}.get(type(field.of), "tables")
             what += f", [[{path}]]" * (what == "tables" and not field.keys)
             most = f", at most {field.most:g}" * math.isfinite(field.most)
             word = "".join(f", or '{word}'" for word in field.words)
