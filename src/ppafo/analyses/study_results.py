@@ -530,7 +530,16 @@ def _panels(
         over_two = partial(_map, results, grid) if len(grid) == 2 else partial(_points, results, varied)
         panels = [over_two(metric, name, name if len(names) > 1 else "") for metric in metrics for name in names]
     elif len(varied) == 1:
-        panels = [_over(results, varied[0], metric) for metric in metrics]
+        across, panels = results.thin(varied[0], MAXIMUM_DRAWN), []
+        for metric in metrics:
+            values, marks = results.thin(metric, MAXIMUM_DRAWN), []
+            for name, colour in zip(results.configurations, COLOURS, strict=False):
+                # Draws come in any order, a line goes from left to right.
+                order = np.argsort(across[name], kind="stable")
+                order = order[:: max(1, order.size // _MAXIMUM_POINTS)]
+                x, y = across[name][order], values[name][order]
+                marks.append(Mark("line", x, y, label=name, colour=colour, style={"marker": "."}))
+            panels.append(Panel(_kind(results, varied[0]), _kind(results, metric), marks))
     else:
         panels = [_histogram(results, metric) for metric in metrics]
     panels += [_band(results, channel) for channel in results.document["study"]["outputs"].get("bands", ())]
@@ -559,19 +568,6 @@ def _histogram(results: StudyResults, metric: str) -> Panel:
         for (name, own), colour in zip(by_name.items(), COLOURS, strict=False)
     ]
     return Panel(kind, Kind(), marks, then=methodcaller("set", yticks=[], **ticks))
-
-
-def _over(results: StudyResults, path: str, metric: str) -> Panel:
-    """Return a panel of a metric over the single varied path."""
-    across, values = results.thin(path, MAXIMUM_DRAWN), results.thin(metric, MAXIMUM_DRAWN)
-    marks = []
-    for name, colour in zip(results.configurations, COLOURS, strict=False):
-        # Draws come in any order, a line goes from left to right.
-        order = np.argsort(across[name], kind="stable")
-        order = order[:: max(1, order.size // _MAXIMUM_POINTS)]
-        x, y = across[name][order], values[name][order]
-        marks.append(Mark("line", x, y, label=name, colour=colour, style={"marker": "."}))
-    return Panel(_kind(results, path), _kind(results, metric), marks)
 
 
 def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, title: str) -> Panel:

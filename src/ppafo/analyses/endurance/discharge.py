@@ -193,7 +193,7 @@ def discharge(
     walked = sum(interval.end - interval.start for interval in intervals if interval.draw > 0.0)
     mass, needed = float(values[0]), smallest_mass_when_warm(bottle, peak_flow)
     usable, change, wall = max(0.0, mass - needed), (values - start).tolist(), bottle.wall
-    ending, message = _end(bottle, peak_flow, content_of(bottle, mass, float(values[1])), mass, usable, reason)
+    ending, message = _end(bottle, peak_flow, content_of(bottle, values), mass, usable, reason)
     return Endurance(
         bottle=bottle,
         schedule=schedule,
@@ -283,7 +283,7 @@ def _recording(bottle: Bottle, intervals: Sequence[_Interval]) -> Recording:
     # The last time may be beyond the last end by rounding.
     numbers = np.minimum(np.searchsorted(ends, times, side="left"), len(intervals) - 1)
     rows = np.array([intervals[number].solution(time) for number, time in zip(numbers, times, strict=True)])
-    contents = [content_of(bottle, float(row[0]), float(row[1])) for row in rows]
+    contents = [content_of(bottle, row) for row in rows]
     flows = [intervals[number].draw for number in numbers]
     pressures = [content.pressure for content in contents]
     channels = {
@@ -300,9 +300,9 @@ def _recording(bottle: Bottle, intervals: Sequence[_Interval]) -> Recording:
     return Recording(f"bottle {bottle.name}", times, named, kind="simulated")
 
 
-def content_of(bottle: Bottle, mass: float, energy: float) -> BottleContent:
-    """Return the state of the content of the bottle for a mass [kg] and an internal energy [J]."""
-    table = bottle.fluid.table
+def content_of(bottle: Bottle, values: Floats) -> BottleContent:
+    """Return the state of the content of the bottle for its mass [kg] and internal energy [J], the first values."""
+    table, (mass, energy) = bottle.fluid.table, values[:2].tolist()
     return bottle_content(table, mass, bottle.volume, content_temperature(table, mass, bottle.volume, energy))
 
 
@@ -313,19 +313,17 @@ def _solve_interval(
     from scipy.integrate import solve_ivp
 
     def rates(_time: float, y: Floats) -> list[float]:
-        state = BottleState(float(y[0]), float(y[1]), float(y[2]))
-        content = content_of(bottle, state.mass, state.energy)
-        now = bottle_rates(content, state, flow, bottle.wall, bottle.room_temperature)
+        state = BottleState(*y[:3].tolist())
+        now = bottle_rates(content_of(bottle, y), state, flow, bottle.wall, bottle.room_temperature)
         inside = (now.mass_rate, now.content_energy_rate, now.wall_temperature_rate)
         return [*inside, flow, now.outflow_power, now.room_heat]
 
     def kelvins_above_freezing(_time: float, y: Floats) -> float:
         # The liquid freezes where its table begins; below, the table knows nothing of the gas either.
-        freezing = bottle.fluid.table.temperatures[0]
-        return content_of(bottle, float(y[0]), float(y[1])).temperature - freezing - _ABOVE_FREEZING
+        return content_of(bottle, y).temperature - bottle.fluid.table.temperatures[0] - _ABOVE_FREEZING
 
     def to_spare(_time: float, y: Floats) -> float:
-        content = content_of(bottle, float(y[0]), float(y[1]))
+        content = content_of(bottle, y)
         return min(reserves(bottle, peak_flow, content.pressure, content.temperature))
 
     # An interval may begin without a reserve, and the solver finds crossings only.

@@ -6,7 +6,7 @@ from functools import partial
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from ppafo.analyses.reproduce.claim import MEANINGS, VERDICTS, Claim, Verdict, count_sentence, verdict_counts
+from ppafo.analyses.reproduce.claim import MEANINGS, VERDICTS, Claim, count_sentence, verdict_counts
 from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
 from ppafo.analyses.reproduce.publication import SEED, Studies
 from ppafo.analyses.reproduce.reported_numbers import INERTIA, NOT_PUBLISHED, known, load_reported
@@ -42,7 +42,7 @@ _STUDIES_HEAD = ("study", "claim", "published", "ours", "verdict")
 _DETAILS_HEAD = ("claim", "statement and source", "agrees", "rests on", "note")
 _RULE = (
     "'Ours' is recomputed by every run of the command. "
-    + " ".join(f"{VERDICTS[verdict].capitalize()}: {meaning}." for verdict, meaning in MEANINGS.items())
+    + " ".join(f"{VERDICTS[verdict].capitalize()}: {meaning}." for verdict, (_, meaning) in MEANINGS.items())
     + " Nothing here was measured."
 )
 TEMPLATE = "reproduction.html.jinja"
@@ -54,14 +54,6 @@ TORQUE_FIGURE = "figure-8-torque-task"
 _EXPERIMENTS = dict(
     zip(EXPERIMENTS, ("step response", "torque task, solenoid", "torque task, proportional"), strict=True)
 )
-_SYMBOLS: dict[Verdict, str] = {
-    "consistent": "✓",
-    "inconsistent_as_reported": "✗",
-    "met_by_fitted_settings": "≈",
-    "plausible": "~",
-    "undetermined": "?",
-    "not_testable": "○",
-}
 _TASK_METRICS = (
     "rms_error",
     "rms_error_ramp",
@@ -220,9 +212,9 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
         "not_published": NOT_PUBLISHED,
         "nothing_confirmed": NOTHING_CONFIRMED,
         "count_sentence": count_sentence(reproduction.claims),
-        "counts": [(name, VERDICTS[name], _SYMBOLS[name], MEANINGS[name], count) for name, count in counts],
+        "counts": [(name, VERDICTS[name], *MEANINGS[name], count) for name, count in counts],
         "words": VERDICTS,
-        "symbols": _SYMBOLS,
+        "symbols": {name: symbol for name, (symbol, _) in MEANINGS.items()},
         "printed_set": reported.parameter_set.name,
         "completed_set": completed.name,
         **{

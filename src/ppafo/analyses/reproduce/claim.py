@@ -14,14 +14,15 @@ Verdict = Literal[
 ]
 VERDICTS: dict[Verdict, str] = {verdict: verdict.replace("_", " ") for verdict in get_args(Verdict)}
 """Verdicts on a claim, in words; only the first two follow from reported numbers alone."""
-MEANINGS: dict[Verdict, str] = {
-    "consistent": "the reported numbers agree with each other",
-    "inconsistent_as_reported": "the reported numbers do not agree with each other",
-    "met_by_fitted_settings": "simulated with settings chosen to meet this claim, which does not confirm them",
-    "plausible": "simulated with assumed settings that were not chosen to meet this claim",
-    "undetermined": "depends on settings that are not reported",
-    "not_testable": "needs a measurement that is not published",
+MEANINGS: dict[Verdict, tuple[str, str]] = {
+    "consistent": ("✓", "the reported numbers agree with each other"),
+    "inconsistent_as_reported": ("✗", "the reported numbers do not agree with each other"),
+    "met_by_fitted_settings": ("≈", "simulated with settings chosen to meet this claim, which does not confirm them"),
+    "plausible": ("~", "simulated with assumed settings that were not chosen to meet this claim"),
+    "undetermined": ("?", "depends on settings that are not reported"),
+    "not_testable": ("○", "needs a measurement that is not published"),
 }
+"""Symbol and meaning of each verdict."""
 
 
 @dataclass(frozen=True, slots=True)
