@@ -171,8 +171,8 @@ def discharge(
     """
     mean_flow = mass_per_stride / stride_time
     content = bottle_content(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
-    if min(reserves(bottle, peak_flow, content.pressure, content.temperature)) <= 0.0:
-        most = flow_limit(bottle, content.pressure, content.temperature)
+    if min(reserves(bottle, peak_flow, content)) <= 0.0:
+        most = flow_limit(bottle, content)
         raise ParameterError(
             f"the largest flow is {shown_text(peak_flow, 'kg/s', '.3g')}, but the regulator of the full bottle "
             f"passes at most {shown_text(most, 'kg/s', '.3g')}; increase regulator.area"
@@ -216,20 +216,20 @@ def discharge(
     )
 
 
-def reserves(bottle: Bottle, peak_flow: float, pressure: float, temperature: float) -> tuple[float, float]:
+def reserves(bottle: Bottle, peak_flow: float, content: BottleContent) -> tuple[float, float]:
     """Return the relative margins of pressure and flow [-] at the largest flow; below 0 the supply pressure is lost.
 
     The pressure margin is the excess over the regulator's need divided by the set pressure; the flow margin is the flow
     limit of the regulator divided by the largest flow, minus 1.
     """
-    to_spare = pressure_reserve(bottle.regulator, pressure, peak_flow) / bottle.regulator.set_pressure
-    return to_spare, flow_limit(bottle, pressure, temperature) / peak_flow - 1.0
+    to_spare = pressure_reserve(bottle.regulator, content.pressure, peak_flow) / bottle.regulator.set_pressure
+    return to_spare, flow_limit(bottle, content) / peak_flow - 1.0
 
 
-def flow_limit(bottle: Bottle, pressure: float, temperature: float) -> float:
-    """Return the largest flow [kg/s] of the regulator at a pressure [Pa] and a temperature [K] in the bottle."""
-    gas_constant = bottle.fluid.table.gas_constant
-    return regulator_flow_limit(bottle.regulator, pressure, temperature, bottle.heat_capacity_ratio, gas_constant)
+def flow_limit(bottle: Bottle, content: BottleContent) -> float:
+    """Return the largest flow [kg/s] of the regulator for the content of the bottle."""
+    ratio, gas_constant = bottle.heat_capacity_ratio, bottle.fluid.table.gas_constant
+    return regulator_flow_limit(bottle.regulator, content.pressure, content.temperature, ratio, gas_constant)
 
 
 def smallest_mass_when_warm(bottle: Bottle, peak_flow: float, enough: float = math.inf) -> float:
@@ -242,8 +242,8 @@ def smallest_mass_when_warm(bottle: Bottle, peak_flow: float, enough: float = ma
     # Halved until nothing is left to halve: the reserve grows with the mass, though not smoothly where liquid begins.
     for _ in range(60):
         middle = 0.5 * (low + high)
-        pressure = bottle_content(table, middle, bottle.volume, room).pressure
-        if min(reserves(bottle, peak_flow, pressure, room)) < 0.0 and pressure < enough:
+        content = bottle_content(table, middle, bottle.volume, room)
+        if min(reserves(bottle, peak_flow, content)) < 0.0 and content.pressure < enough:
             low = middle
         else:
             high = middle
@@ -265,7 +265,7 @@ def _end(
     if stopped_by == "frozen":
         cold = "the liquid begins to freeze (dry ice)" if has_liquid(bottle.fluid.table) else "the gas is too cold"
         return "frozen", f"{cold}, and the property table ends here; {remaining}, {warm}"
-    pressure_margin, flow_margin = reserves(bottle, peak_flow, content.pressure, content.temperature)
+    pressure_margin, flow_margin = reserves(bottle, peak_flow, content)
     # Both are fractions, so that the smaller one says what went short first.
     is_pressure = pressure_margin <= flow_margin
     short = "maintain the supply pressure" if is_pressure else "drive the largest flow through the regulator"
@@ -323,8 +323,7 @@ def _solve_interval(
         return content_of(bottle, y).temperature - bottle.fluid.table.temperatures[0] - _ABOVE_FREEZING
 
     def to_spare(_time: float, y: Floats) -> float:
-        content = content_of(bottle, y)
-        return min(reserves(bottle, peak_flow, content.pressure, content.temperature))
+        return min(reserves(bottle, peak_flow, content_of(bottle, y)))
 
     # An interval may begin without a reserve, and the solver finds crossings only.
     if flow > 0.0 and to_spare(start, values) <= 0.0:
