@@ -8,7 +8,7 @@ import pytest
 from ppafo.analyses.identify import Identification, identify
 from ppafo.cli.main import main
 
-EXPERIMENTS = ("static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak")
+EXPERIMENTS = ("static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak-steady", "vane-leak")
 PROBLEM = 'schema_version = 1\nname = "bench"\ndevice.set = "ppafo2011"\n' + "".join(
     f'[[procedure]]\nkind = "{kind}"\nrecordings = ["{kind}.csv"]\n' for kind in EXPERIMENTS
 )
@@ -26,7 +26,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def found(bench: Path) -> Identification:
-    """What the five procedures make of it."""
+    """What the procedures make of it."""
     return identify(bench / "problem.toml").found
 
 

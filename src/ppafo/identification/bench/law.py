@@ -181,7 +181,7 @@ def tolerance(name: str, deviation: float, start: float = 0.0, family: str = "")
     # The scale of the search is the limit, so that a step of one scale is a likely one.
     limit = math.sqrt(3.0) * deviation
     width = _WIDEST * limit
-    return (FitNumber(name, start, start - width, start + width, limit, deviation, family=family),)
+    return (FitNumber(name, start, start - width, start + width, limit, deviation, (), True, family=family),)
 
 
 def within(name: str, limit: float, family: str = "") -> tuple[FitNumber, ...]:

@@ -54,20 +54,9 @@ def test_a_parameter_that_makes_no_sense_is_refused(
         problem(experiment, parameter)
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"channels": ("torque",)}, "channel 'torque' cannot be fitted"),
-        ({"channels": ()}, "no channel"),
-        ({"inputs": ("comand",)}, "not a measured input, did you mean 'command'"),
-        ({"inputs": ("supply_pressure",)}, r"has no channel 'supply_pressure', did you mean 'pressure_1'"),
-    ],
-)
-def test_an_experiment_that_makes_no_sense_is_refused(
-    experiment: FittedExperiment, change: dict[str, object], message: str
-) -> None:
-    with pytest.raises(IdentificationError, match=message):
-        problem(dataclasses.replace(experiment, **change), INERTIA)  # type: ignore[arg-type]
+def test_an_experiment_without_a_channel_is_refused(experiment: FittedExperiment) -> None:
+    with pytest.raises(IdentificationError, match="no channel"):
+        problem(dataclasses.replace(experiment, channels=()), INERTIA)
 
 
 def test_the_same_parameter_twice_is_refused(experiment: FittedExperiment) -> None:
