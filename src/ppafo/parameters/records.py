@@ -10,7 +10,7 @@ import types
 import typing
 from collections.abc import Mapping
 from dataclasses import MISSING, field, fields, is_dataclass, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
@@ -59,7 +59,8 @@ def checked_record(
     record: type[Record], document: Mapping[str, Any], file: str, refusal: type[PpafoError], content: bytes = b""
 ) -> Record:
     """Return a document as a record. Raises ``refusal`` with all faults, by line of the ``content`` of its file."""
-    check_keys(document, fields_of(record), file, refusal, decoded(content))
+    layout: Any = record
+    check_keys(document, fields_of(layout), file, refusal, decoded(content))
     return record_from(record, document)
 
 
@@ -68,6 +69,7 @@ def record_schema(record: Any, title: str) -> dict[str, Any]:
     return schema_of(title, lambda _: fields_of(record))
 
 
+@cache
 def fields_of(record: Any) -> dict[str, Field]:
     """Return the fields that a record declares, by path; one with a default may be omitted."""
     found: dict[str, Field] = {}
@@ -83,6 +85,7 @@ def fields_of(record: Any) -> dict[str, Field]:
     return found
 
 
+@cache
 def _keys(record: Any) -> list[tuple[str, tuple[Any, Any], Any]]:
     """Return name, type with declaration, and default of each field; MISSING for no default, None for one made."""
     hints = typing.get_type_hints(record, include_extras=True)
@@ -131,6 +134,7 @@ def _field(base: Any, mark: Any, is_required: bool) -> Field:
     return words
 
 
+@cache
 def _records(base: Any) -> Mapping[str, Any]:
     """Return the records of a union by their kind, or a single one under ""; empty for any other type."""
     each = get_args(base) if get_origin(base) in (typing.Union, types.UnionType) else (base,)
@@ -150,7 +154,8 @@ def _fields_of_kind(fields: Mapping[str, Fields], table: Mapping[str, Any]) -> F
 
 def record_from(record: type[Record], table: Mapping[str, Any]) -> Record:
     """Return the record of a table that has been checked, with quantities in SI units."""
-    declared = {name: parts for name, parts, _ in _keys(record)}
+    layout: Any = record
+    declared = {name: parts for name, parts, _ in _keys(layout)}
     return record(**{name: _value(*declared[name], value) for name, value in table.items()})
 
 
