@@ -58,6 +58,7 @@ def check_plausible(walk: MeanStride) -> None:
         (check_ankle_range, check_shank, check_ankle),
         (check_moment,),
         (check_force,),
+        (check_centre_of_pressure,),
     )
     check_all([partial(check, walk) for check in chain] for chain in chains)
 
@@ -285,6 +286,10 @@ FORCE_MEAN = (0.25, 0.75)
 USUAL_FORCE_MEAN = (0.42, 0.58)
 """Plausible mean of the vertical force [body weights]: both legs together carry 1, each half in symmetric walking."""
 
+UNDER_FOOT = (-0.2, 0.4)
+"""Plausible places of the centre of pressure in front of the ankle [m]: heel to toes of a large shoe, with room."""
+LEAST_ROLL = 0.005
+"""Least range of the centre of pressure in stance [m]; 0.15 to 0.25 in healthy walking, a few cm on the toes alone."""
 _ON_GROUND = 0.05
 """Magnitude of the force [body weights] below which a force plate counts as unloaded."""
 _AFTER_TOE_OFF = 0.03
@@ -367,6 +372,19 @@ def check_force(walk: MeanStride) -> None:
         raise DataError(
             f"{where} has a mean of {mean:.3g} body weights (plausible: {FORCE_MEAN[0]:g} to {FORCE_MEAN[1]:g}) and a "
             f"peak of {peak:.3g} (plausible: {FORCE_PEAK[0]:g} to {FORCE_PEAK[1]:g})"
+        )
+
+
+def check_centre_of_pressure(walk: MeanStride) -> None:
+    """Raise DataError for a centre of pressure that no foot can have; a stride without one passes."""
+    if "centre_of_pressure" not in walk.curves:
+        return
+    place, (low, high) = walk.curves["centre_of_pressure"], UNDER_FOOT
+    back, front = float(np.min(place)), float(np.max(place))
+    if back < low or front > high or front - back < LEAST_ROLL:
+        raise DataError(
+            f"{walk.where('centre_of_pressure')} is {back:.3g} to {front:.3g} m in front of the ankle (plausible: "
+            f"within {low:g} to {high:g} m, and over {LEAST_ROLL:g} m or more)"
         )
 
 

@@ -346,8 +346,11 @@ def test_the_eleven_real_strides_one_after_the_other_give_the_built_in_gait(
     assert found.stride_time_deviation == pytest.approx(normative.stride_time_deviation, rel=0.3)
 
 
-def test_pressure_counts_forward(csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording) -> None:
-    backward = {**columns, "pressure_back [cm]": -5.0 - 0.0 * walk.time}
+def test_pressure_counts_forward(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording, normative: Gait
+) -> None:
+    stance = np.minimum((walk.time / normative.stride_time) % 1.0 / normative.stance_share, 1.0)
+    backward = {**columns, "pressure_back [cm]": -3.0 - 4.0 * stance}
     columns_map = GaitMap(
         shank_angle=ShankMap(terms=("shank_angle",)),
         ankle_angle=AngleMap(terms=("ankle_angle",), positive="plantarflexion", neutral="90 deg"),
@@ -355,4 +358,8 @@ def test_pressure_counts_forward(csv_of: Callable[..., Path], columns: dict[str,
         centre_of_pressure=PressureMap(terms=("pressure_back",), positive="backward"),
     )
     found = import_gait([csv_of(backward)], ImportSettings(62.0, columns=columns_map))
-    assert found.gait.curve("centre_of_pressure").mean == pytest.approx(0.05, abs=1e-6)
+    assert found.gait.curve("centre_of_pressure").mean == pytest.approx(0.05, abs=0.005)
+    for metres in (5.0, 5.0e-5):
+        wrong = csv_of({**columns, "centre_of_pressure [m]": metres * (1.0 + stance)})
+        with pytest.raises(DataError, match=r"centre_of_pressure is .* m in front of the ankle \(plausible: within"):
+            import_gait([wrong], ImportSettings(62.0))
