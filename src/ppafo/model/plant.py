@@ -103,8 +103,6 @@ class ActuatorFunctions(NamedTuple):
     """Torque at an angle and two absolute pressures."""
     rest_volumes: Callable[..., tuple[float, float]]
     """Volumes of both chambers at an angle; for compliant chambers at their supply pressures."""
-    rest_pressures_per_mass: Callable[..., tuple[float, float]]
-    """Pressures divided by masses, for the volumes of ``rest_volumes``."""
     held_pressures: Callable[..., tuple[float, float]]
     """Absolute pressures of the chambers in a ``HeldChambers`` state."""
 
@@ -211,10 +209,9 @@ def chamber_mass(pressure: float, volume: Numeric, gas_product: float) -> Numeri
     return pressure * volume / gas_product
 
 
-def pressures_per_mass(plant: PlantParameters, angle: Numeric) -> tuple[Numeric, Numeric]:
-    """Pressures divided by masses [Pa/kg] of both chambers at an angle [rad]; one division costs ten products."""
-    volume_1, volume_2 = chamber_volumes(plant, angle)
-    per_volumes = plant.gas_product / (volume_1 * volume_2)
+def pressures_per_mass(gas_product: float, volume_1: Numeric, volume_2: Numeric) -> tuple[Numeric, Numeric]:
+    """Pressures divided by masses [Pa/kg] of two chambers from their volumes [m^3]; a division costs ten products."""
+    per_volumes = gas_product / (volume_1 * volume_2)
     return volume_2 * per_volumes, volume_1 * per_volumes
 
 
@@ -222,7 +219,8 @@ def chamber_pressures(
     plant: PlantParameters, angle: Numeric, mass_1: Numeric, mass_2: Numeric
 ) -> tuple[Numeric, Numeric]:
     """Absolute pressures of both chambers [Pa]. Equation (3)."""
-    per_mass_1, per_mass_2 = pressures_per_mass(plant, angle)
+    volume_1, volume_2 = chamber_volumes(plant, angle)
+    per_mass_1, per_mass_2 = pressures_per_mass(plant.gas_product, volume_1, volume_2)
     return mass_1 * per_mass_1, mass_2 * per_mass_2
 
 

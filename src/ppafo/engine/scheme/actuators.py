@@ -20,7 +20,6 @@ from ppafo.model.plant import (
     chamber_pressures,
     chamber_volumes,
     joint_torque,
-    pressures_per_mass,
 )
 
 
@@ -29,12 +28,6 @@ def rest_volumes(plant: PlantParameters, angle: float, *, parts: ActuatorFunctio
     # At the supplies' pressures, not the present ones: what an error is measured against must not move with it.
     still = parts.chambers(plant, angle, plant.supply_pressure, plant.dorsiflexion_pressure)
     return still.volume_1, still.volume_2
-
-
-def rest_pressures_per_mass(plant: PlantParameters, angle: float, *, parts: ActuatorFunctions) -> tuple[float, float]:
-    """Pressure divided by mass [Pa/kg] of both chambers, with the volumes at the supply pressures."""
-    volume_1, volume_2 = rest_volumes(plant, angle, parts=parts)
-    return plant.gas_product / volume_1, plant.gas_product / volume_2
 
 
 def pressures_held(
@@ -49,7 +42,6 @@ VANE_FUNCTIONS = ActuatorFunctions(
     pressures=chamber_pressures,
     torque=joint_torque,
     rest_volumes=chamber_volumes,
-    rest_pressures_per_mass=pressures_per_mass,
     held_pressures=held_pressures,
 )
 
@@ -62,7 +54,6 @@ def functions_of_actuator(actuator: ActuatorModel) -> ActuatorFunctions:
     own = VANE_FUNCTIONS._replace(chambers=actuator.chambers, pressures=actuator.pressures, torque=actuator.torque)
     return own._replace(
         rest_volumes=made_of(rest_volumes, "rest_volumes", own),
-        rest_pressures_per_mass=made_of(rest_pressures_per_mass, "rest_pressures_per_mass", own),
         held_pressures=made_of(pressures_held, "pressures_held", own),
     )
 

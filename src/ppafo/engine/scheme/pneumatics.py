@@ -16,7 +16,15 @@ from typing import Any, NamedTuple
 
 from ppafo.model.columns import smaller
 from ppafo.model.orifice import orifice_flow
-from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, PortFlow, PortSlopes, admitted_flow
+from ppafo.model.plant import (
+    ActuatorFunctions,
+    PlantParameters,
+    PlantState,
+    PortFlow,
+    PortSlopes,
+    admitted_flow,
+    pressures_per_mass,
+)
 from ppafo.model.ports import leakage_path
 
 
@@ -145,7 +153,8 @@ class HeldChambers(NamedTuple):
 
 def held_chambers(plant: PlantParameters, angle: float, *, parts: ActuatorFunctions) -> HeldChambers:
     """Ratios of pressure to mass of both chambers at an angle [rad]. Equation (3)."""
-    per_mass_1, per_mass_2 = parts.rest_pressures_per_mass(plant, angle)
+    volume_1, volume_2 = parts.rest_volumes(plant, angle)
+    per_mass_1, per_mass_2 = pressures_per_mass(plant.gas_product, volume_1, volume_2)
     return HeldChambers(per_mass_1=per_mass_1, per_mass_2=per_mass_2, angle=angle)
 
 

@@ -37,7 +37,7 @@ from ppafo.engine.scheme.thermal_gas import (
 )
 from ppafo.engine.step.lane import Lane
 from ppafo.model.gas import enthalpy_flow_ratio
-from ppafo.model.plant import PlantState
+from ppafo.model.plant import PlantState, pressures_per_mass
 
 
 def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
@@ -74,9 +74,8 @@ def begin_moving(parts: Program, lane: Lane, next_angle: float, length: float) -
     ahead = parts.actuator.chambers(plant, next_angle, pressure_1, pressure_2)
     room_1 = here.volume_1 + pressure_1 * here.compliance_1
     room_2 = here.volume_2 + pressure_2 * here.compliance_2
-    # One division, as in ``pressures_per_mass``.
-    per_rooms = plant.gas_product / (room_1 * room_2)
-    linear = linearise(room_2 * per_rooms, room_1 * per_rooms, lane.flowing, length)
+    per_mass_1, per_mass_2 = pressures_per_mass(plant.gas_product, room_1, room_2)
+    linear = linearise(per_mass_1, per_mass_2, lane.flowing, length)
     # A growing volume lowers the pressure as a loss of mass at this rate would; parts of a step may have no length.
     per_duration = 1.0 / (plant.gas_product * max(length, SHORTEST))
     drift = response(

@@ -10,7 +10,7 @@ from ppafo.analyses.linearise.model import one_sided_slopes
 from ppafo.engine.lanes import Floats
 from ppafo.engine.scheme.pneumatics import GAMMA, flow_rates, gas_flows, linearise
 from ppafo.model.orifice import fitted_flow_function, orifice_flow
-from ppafo.model.plant import Openings, blended_port_flow, blended_ports, pressures_per_mass
+from ppafo.model.plant import Openings, blended_port_flow, blended_ports, chamber_volumes, pressures_per_mass
 from ppafo.parameters.plant import plant_parameters
 
 PLANT = plant_parameters(ppafo.load_device("ppafo2011"))
@@ -49,7 +49,7 @@ def test_near_equal_pressures_the_slope_is_of_the_straight_line_that_the_flow_is
 def test_the_jacobian_of_a_step_of_the_lanes_is_that_of_its_own_flows(ratios: tuple[float, float]) -> None:
     """The lanes have their Jacobian written by hand; here the flows beside it are differentiated."""
     openings = Openings(source_1=0.6, vent_1=0.1, source_2=0.2, vent_2=0.5)
-    per_mass, step = pressures_per_mass(PLANT, 1.2), 1e-3
+    per_mass, step = pressures_per_mass(PLANT.gas_product, *chamber_volumes(PLANT, 1.2)), 1e-3
     pressures = [ratio * PLANT.supply_pressure for ratio in ratios]
     ports = blended_ports(PLANT, openings)
 
