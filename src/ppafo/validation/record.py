@@ -181,6 +181,9 @@ def record_of(
             is_at_stop = name == ANGLE and request.start.angle > device.actuator.angle_max - error
             start = getattr(request.start, name) + float(-error if is_at_stop else error)
             moved.append(replace(request, start=replace(request.start, **{name: start})))
+    if (error := request.start.velocity_error) > 0.0:
+        start = request.start.angular_velocity + error
+        moved.append(replace(request, start=replace(request.start, angular_velocity=start)))
     unmoved, *others = replay_together([request, *moved])
     return record._replace(
         starts=tuple(

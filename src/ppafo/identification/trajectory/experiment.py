@@ -17,7 +17,6 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
 from ppafo.parameters.effects import switches_of
 from ppafo.parameters.parameter_set import ParameterSet
-from ppafo.signals.faults import noise_of, resolution_of
 from ppafo.signals.recording import Recording
 from ppafo.simulation import numbers
 from ppafo.simulation.declaration import FREE, INITIAL, LEG, shank_settings
@@ -35,6 +34,7 @@ from ppafo.simulation.recorded.channels import (
     sample_period,
 )
 from ppafo.simulation.recorded.inputs import between_stops, supply_paths, with_highest_supply
+from ppafo.simulation.recorded.motion import motion_of, read_error
 from ppafo.simulation.recorded.rest import value_at_rest
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.simulation.scenario import (
@@ -103,11 +103,6 @@ deviations, and least value as a fraction of the limit [-].
 
 At the least value the fall of the friction is practically abrupt; at 0 the effect would be off.
 """
-_WINDOWS = 8, 12, 16, 24, 32, 48, 64
-"""Numbers of first samples from which the velocity of a start in motion is found."""
-_FOLLOWED, _SURE, _SEEN, _LEAST_VELOCITY = 1.3, 2.0, 4.0, 0.05
-"""Scatter up to which a cubic follows the samples [noises], factor of the error of its velocity, for the cubic is none
-of the model, and least velocity of a motion: in such errors [-], and beyond them [rad/s]."""
 _START_OF_ANGLE = math.radians(0.05)
 """Standard deviation of an initial angle read from a recording [rad]."""
 
@@ -232,8 +227,7 @@ def _moving(experiment: FittedExperiment, scenario: Scenario) -> Scenario:
 def motion_at_start(experiment: FittedExperiment) -> tuple[float, float, float] | None:
     """Return angle [rad], angular velocity and its standard error [rad/s] of a recorded start; None if it is at rest.
 
-    They are those of a cubic through the first samples, as many as it follows to their noise. A recorded velocity says
-    more.
+    A recorded velocity says more.
     """
     recording = experiment.recording
     names = recording.names
@@ -241,15 +235,7 @@ def motion_at_start(experiment: FittedExperiment) -> tuple[float, float, float] 
         return None
     inside = recording.time >= experiment.start - _FITS
     time, angles = recording.time[inside] - experiment.start, recording[ANGLE][inside]
-    noise, found = _read_error(recording, ANGLE), None
-    for count in (count for count in _WINDOWS if count <= time.size):
-        coefficients, covariance = np.polyfit(time[:count], angles[:count], 3, cov="unscaled")
-        scatter = float(np.std(angles[:count] - np.polyval(coefficients, time[:count])))
-        if found is not None and scatter > _FOLLOWED * noise:
-            break
-        angle, velocity = float(coefficients[3]), float(coefficients[2])
-        found = angle, velocity, _SURE * max(noise, scatter) * math.sqrt(float(covariance[2, 2]))
-    return found if found is not None and abs(found[1]) > _LEAST_VELOCITY + _SEEN * found[2] else None
+    return motion_of(time, angles, read_error(recording, ANGLE))
 
 
 def use_of(experiment: FittedExperiment) -> UsedRecording:
@@ -550,25 +536,18 @@ def _of_run(tolerances: Tolerances, experiment: FittedExperiment) -> dict[str, t
     # Where the vane lies at a stop, the stop says where it starts.
     if free is not None and ANGLE not in inputs and not any(math.isclose(free.angle, stop) for stop in stops):
         stated = tolerances.start_of_angle
-        read = math.hypot(_START_OF_ANGLE, _read_error(recording, ANGLE)) if is_read else 0.0
+        read = math.hypot(_START_OF_ANGLE, read_error(recording, ANGLE)) if is_read else 0.0
         # The angle of a scenario was set by a sensor, whose zero is known to this limit.
         usual = read or deviation_of_limit(tolerances.zero_of_angle)
         found["motion.angle"] = usual if stated is None else deviation_of_limit(stated)
     if isinstance(scenario.motion, FreeMotion) and (start := motion_at_start(experiment)) is not None:
         found["motion.angular_velocity"] = start[2]
-        found.setdefault("motion.angle", math.hypot(_START_OF_ANGLE, _read_error(recording, ANGLE)))
+        found.setdefault("motion.angle", math.hypot(_START_OF_ANGLE, read_error(recording, ANGLE)))
     for name in ("pressure_1", "pressure_2"):
-        noise = _read_error(recording, name) if is_read else 0.0
+        noise = read_error(recording, name) if is_read else 0.0
         stated = tolerances.start_of_pressure
         found[f"initial.{name}"] = noise if stated is None else deviation_of_limit(stated)
     return {path: (number_at(scenario, path), deviation) for path, deviation in found.items()}
-
-
-def _read_error(recording: Recording, name: str) -> float:
-    """Return the standard deviation [SI] of one sample of a channel, from noise and resolution; 0 if not recorded."""
-    if name not in recording:
-        return 0.0
-    return math.hypot(noise_of(recording[name]), resolution_of(recording[name]) / math.sqrt(12.0))
 
 
 def _of_set(

@@ -1,4 +1,4 @@
-"""Initial state of a replay: angle and pressures, averaged over the samples before the first command."""
+"""Initial state of a replay: angle and pressures before the first command, and the velocity with which it begins."""
 
 import math
 from collections.abc import Mapping
@@ -12,6 +12,7 @@ from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.channels import ANGLE, COMMAND
 from ppafo.simulation.recorded.inputs import between_stops
+from ppafo.simulation.recorded.motion import motion_of, read_error
 
 REST_WINDOW = 0.05
 """Time before the first command over which the start is averaged [s]; so short that a leak has no effect."""
@@ -29,12 +30,16 @@ _LEAST_RANK = 1.0e-6
 
 @dataclass(frozen=True, slots=True)
 class ReplayStart:
-    """Angle [rad], angular velocity [rad/s] and pressures [Pa absolute] at the first sample."""
+    """Angle [rad], angular velocity [rad/s] and pressures [Pa absolute] at the first sample.
+
+    ``velocity_error`` is the standard error of a velocity that the angles told [rad/s].
+    """
 
     angle: float
     angular_velocity: float
     pressure_1: float
     pressure_2: float
+    velocity_error: float = 0.0
 
 
 def samples_at_rest(recording: Recording) -> int:
@@ -49,8 +54,14 @@ def samples_at_rest(recording: Recording) -> int:
 def start_of(recording: Recording, device: Device, known: Mapping[str, float], file: str) -> ReplayStart:
     """Return the initial state of a replay: ``known`` values [SI] take precedence over the averaged samples at rest.
 
-    Raises DataError, prefixed with ``file``, for a missing channel.
+    The first angles tell a velocity that is not recorded. Raises DataError, with ``file``, for a missing channel.
     """
+    error = 0.0
+    if ANGLE in recording and ANGLE not in known and "angular_velocity" not in recording:
+        time = recording.time - recording.time[0]
+        if (motion := motion_of(time, recording[ANGLE], read_error(recording, ANGLE))) is not None:
+            angle, velocity, error = motion
+            known = {ANGLE: angle, "angular_velocity": velocity, **known}
     count, values = samples_at_rest(recording), dict(known)
     if device.actuator.has_one_chamber and "pressure_2" not in recording:
         # No recorded channel depends on the dead volume behind the other port.
@@ -61,7 +72,8 @@ def start_of(recording: Recording, device: Device, known: Mapping[str, float], f
         elif name != "angular_velocity" and name not in values:
             raise DataError(f"{file}: there is no channel '{name}' for the initial state")
     angle = float(between_stops(np.array([values[ANGLE]]), device, file)[0])
-    return ReplayStart(angle, values.get("angular_velocity", 0.0), values["pressure_1"], values["pressure_2"])
+    velocity = values.get("angular_velocity", 0.0)
+    return ReplayStart(angle, velocity, values["pressure_1"], values["pressure_2"], error)
 
 
 def value_at_rest(time: Floats, values: Floats, at_end: bool = False) -> float:
