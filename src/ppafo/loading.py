@@ -25,6 +25,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.wording import known_names
 
 _OF_WALKS = {"gait", "wearer", "bottle"}
+_IN_FILE = "# or in the file of a scenario, in place of the tables of these names"
 
 
 def list_all_scenarios() -> tuple[str, ...]:
@@ -157,9 +158,6 @@ def usage_text(scenario: Scenario) -> str:
     words += [word for override in origin.overrides for word in ("--set", override)]
     name = origin.file or scenario.name
     return "\n".join((shlex.join(("ppafo", command, name, *words)), "", _IN_FILE, *_changed_tables(scenario)))
-
-
-_IN_FILE = "# or in the file of a scenario, in place of the tables of these names"
 
 
 def _changed_tables(scenario: Scenario) -> Iterator[str]:

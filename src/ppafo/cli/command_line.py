@@ -39,6 +39,8 @@ OUT = "out"
 
 _Verb = Callable[..., Any]
 """Command function: its signature defines the arguments, its return value the output."""
+_NAMING = ("overrides", "tasks", "metric", "metrics", "also", "such_that", "form")
+"""Parameters whose texts may name an object ``module:OBJECT`` of a user module."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -282,10 +284,6 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     with output.progress_line() as progress, read_by("command line"):
         answer = verb(**values, **({PROGRESS: progress} if PROGRESS in parameters else {}))
     return output.deliver(answer, parsed.json, folder, name, has_written=OUT in parameters)
-
-
-_NAMING = ("overrides", "tasks", "metric", "metrics", "also", "such_that", "form")
-"""Parameters whose texts may name an object ``module:OBJECT`` of a user module."""
 
 
 def _texts(values: Iterable[Any]) -> Iterator[str]:

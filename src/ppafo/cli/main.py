@@ -39,6 +39,28 @@ _SCRIPT = """\
 }}
 complete -o default -F _ppafo ppafo
 """
+FIRST_STEPS = """\
+Model-based design of pneumatic powered orthoses. Start with one of these:
+
+see it
+  ppafo simulate torque-task-proportional   the paper's torque task; figures and a report go to out/
+  ppafo walk solenoid                       a minute of walking with the device
+  ppafo workbench --out page.html           all of it with sliders, in a browser
+the paper
+  ppafo reproduce                           its experiments against its reported numbers
+your device
+  ppafo new set mine                        a file to fill in; also for a scenario, a study, a walk
+  ppafo design push-off                     from a torque profile to valve, pressure and bottle
+  ppafo identify FILE                       from bench recordings to parameters with intervals
+learn
+  ppafo new example                         the examples of the how-to pages, ready to run
+
+All commands: ppafo --help"""
+"""Output of ``ppafo`` without arguments."""
+EXIT_BAD_INPUT = 2
+_LONGEST_MESSAGE = 1000
+OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
+"""Threshold of garbage collection at start; Python's default of 700 costs a tenth of the start-up time."""
 
 
 def completion_script(shell: str) -> str:
@@ -68,32 +90,6 @@ def _words(command: Command) -> list[str]:
         words += map(str, action.choices or ())
         words += kind_at(_NAMES[action.metavar])() if action.metavar in _NAMES else ()
     return list(dict.fromkeys(words))
-
-
-FIRST_STEPS = """\
-Model-based design of pneumatic powered orthoses. Start with one of these:
-
-see it
-  ppafo simulate torque-task-proportional   the paper's torque task; figures and a report go to out/
-  ppafo walk solenoid                       a minute of walking with the device
-  ppafo workbench --out page.html           all of it with sliders, in a browser
-the paper
-  ppafo reproduce                           its experiments against its reported numbers
-your device
-  ppafo new set mine                        a file to fill in; also for a scenario, a study, a walk
-  ppafo design push-off                     from a torque profile to valve, pressure and bottle
-  ppafo identify FILE                       from bench recordings to parameters with intervals
-learn
-  ppafo new example                         the examples of the how-to pages, ready to run
-
-All commands: ppafo --help"""
-"""Output of ``ppafo`` without arguments."""
-
-EXIT_BAD_INPUT = 2
-_LONGEST_MESSAGE = 1000
-
-OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
-"""Threshold of garbage collection at start; Python's default of 700 costs a tenth of the start-up time."""
 
 
 def build_parser(words: Sequence[str]) -> CommandParser:

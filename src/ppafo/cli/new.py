@@ -27,6 +27,9 @@ _TABLE = re.compile(r"^(?=\[)", re.MULTILINE)
 _OF_THE_OTHER = "[reported.", "[[accepted]]"
 _FIRST_TABLE = re.compile(r"^\s*\[", re.MULTILINE)
 _FOLDER = resources.files("ppafo") / "examples"
+_WITH_SOURCES = ("set", "bottle")
+"""Kinds of file whose values have a source each."""
+EXAMPLE = "example"
 
 
 def load_examples() -> dict[str, dict[str, Any]]:
@@ -113,10 +116,6 @@ KINDS: dict[str, _NewFile] = {
     ),
 }
 """Kinds of file written by ``ppafo new``, each with a template in ``templates``."""
-
-_WITH_SOURCES = ("set", "bottle")
-"""Kinds of file whose values have a source each."""
-EXAMPLE = "example"
 
 
 def new(

@@ -9,6 +9,8 @@ from ppafo.model.elementary import TURN, sine_and_cosine_of_turns
 
 NEVER = 1.0e6
 """Time [s] of a knot that is not used, and period of a sine that does not move."""
+KNOTS = 32
+"""Number of knots in the table; the first knot is at time 0."""
 
 
 class ConstantProfile(NamedTuple):
@@ -113,10 +115,6 @@ SINE = ProfileKind(
     is_smooth=True,
     period=sine_period,
 )
-
-
-KNOTS = 32
-"""Number of knots in the table; the first knot is at time 0."""
 
 
 class Knot(NamedTuple):

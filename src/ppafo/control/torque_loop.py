@@ -16,18 +16,6 @@ torque, R is the rate of that quantity, and its unit replaces N m.
 
 from typing import NamedTuple
 
-
-class TorqueLoop(NamedTuple):
-    """Torque rate R at full opening [N m/s], dead time theta [s], and the largest rate that the flow allows [N m/s].
-
-    A valve that regulates pressures reaches the largest rate with less than its full opening.
-    """
-
-    rate: float
-    dead_time: float
-    largest_rate: float
-
-
 PROPORTIONAL_GAIN = "proportional gain of the torque loop"
 INTEGRAL_GAIN = "integral gain of the torque loop"
 INTEGRAL_RATE = "integral rate of the torque loop"
@@ -38,27 +26,33 @@ DEAD_ZONE = "dead zone of the torque loop"
 RELEASE = "release of the torque loop"
 REACH = "torque reach of the device"
 """Names of the parameters of the loop from which a setting may take its default; the functions below compute them."""
-
 LEAST_TORQUE = 5.0e-4
 """Smallest torque change within the dead time [N m] for which gains are computed; smaller ones use the same gains."""
-
 LARGEST_OPENING = 0.77
 """Opening of the dead-zone law for a slow chamber; the rest of the torque change comes from the falling pressure."""
-
 DEAD_ZONE_SHARE, RELEASE_SHARE = 0.042, 0.0062
 """Errors at which a dead-zone law opens the valve and closes it again, divided by the torque range [-].
 
 Both are 0.21 N m and 0.031 N m for the 5 N m that the paper's actuator reaches at 50 psi_g.
 """
-
 SAMPLES_LATE = 1.5
 """Delay of a sampled command in sample periods: one for the computation, half of one for the zero-order hold."""
-
 SHARPNESS = 1.0 / 128.0
 """Opening [-] within which the dead band is crossed: a jump at 0 would let the valve switch back and forth.
 
 SHARPNESS is a power of two, so that laws in fixed point use the same value.
 """
+
+
+class TorqueLoop(NamedTuple):
+    """Torque rate R at full opening [N m/s], dead time theta [s], and the largest rate that the flow allows [N m/s].
+
+    A valve that regulates pressures reaches the largest rate with less than its full opening.
+    """
+
+    rate: float
+    dead_time: float
+    largest_rate: float
 
 
 def beyond_dead_band(opening: float, dead_band: float) -> float:

@@ -6,6 +6,8 @@ from pathlib import Path
 
 MAXIMUM_BYTES_TYPED = 1_000_000
 """Largest size [bytes] of a file written by hand, such as a scenario or a parameter set."""
+_TWO_CHARACTERS = 4
+"""Bytes of UTF-16."""
 
 
 def read_regular_file(path: Path, maximum: int | None = None) -> bytes:
@@ -24,10 +26,6 @@ def read_regular_file(path: Path, maximum: int | None = None) -> bytes:
         if maximum is None or len(content) <= maximum:
             return content
     raise OSError(None, f"it is larger than {maximum / 1e6:g} MB, the maximum size of such a file")
-
-
-_TWO_CHARACTERS = 4
-"""Bytes of UTF-16."""
 
 
 def decoded(content: bytes) -> str:

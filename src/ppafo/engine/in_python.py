@@ -35,6 +35,8 @@ from ppafo.model.declaration import PlainFunction
 
 OWN = "ppafo."
 """Prefix of module names whose functions may also be called through the module name."""
+LOWEST_INTEGER = -(2**63)
+"""Lowest 64-bit integer, which processors return for numbers that 64-bit integers cannot represent."""
 
 
 class _EffectRows(Protocol):
@@ -399,9 +401,6 @@ COLUMNS = Operations(_ForColumns, _OF_COLUMNS)
 
 # Operations that go on where Python would raise, with what compiled code gives there: a run that diverges divides by
 # zero or takes the root of a negative number; compiled, it ends as one that failed.
-
-LOWEST_INTEGER = -(2**63)
-"""Lowest 64-bit integer, which processors return for numbers that 64-bit integers cannot represent."""
 
 
 def quotient(dividend: float, divisor: float) -> float:

@@ -55,6 +55,8 @@ QUICK_STEPS = 200_000
 
 SIGNAL_ROWS = 3
 """Number of readings that may be delayed: angle and both pressures."""
+RunnableProgram: TypeAlias = "ModuleType | PythonProgram"
+"""Program whose ``advance`` advances a block of runs by some steps: compiled, or run by Python itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,9 +111,6 @@ class BatchResult:
 
 Count: TypeAlias = Callable[[int], object]
 """Callback from the calling thread with the number of runs that have ended since the last call."""
-
-RunnableProgram: TypeAlias = "ModuleType | PythonProgram"
-"""Program whose ``advance`` advances a block of runs by some steps: compiled, or run by Python itself."""
 
 
 def effort_for(batch: Batch) -> Effort:

@@ -12,6 +12,9 @@ from ppafo.model.plant import PlantParameters, net_torque, viscous_torque
 from ppafo.model.ports import exhaust_path, supply_path
 from ppafo.model.valves.kind import valve_problem
 
+TEST_ANGLES = (1.0, 1.5)
+"""Angles [rad] at which the torque on a joint at rest is tested; a spring is relaxed at one of them at most."""
+
 
 def link_program(program: Program, replacements: Replacements) -> None:
     """Add the functions with which the components of a program replace functions of the model.
@@ -35,10 +38,6 @@ def link_program(program: Program, replacements: Replacements) -> None:
                 f"effect '{effect.name}': a component of the program already has this name; rename the effect"
             )
     link_effects(program.effects, replacements)
-
-
-TEST_ANGLES = (1.0, 1.5)
-"""Angles [rad] at which the torque on a joint at rest is tested; a spring is relaxed at one of them at most."""
 
 
 def check_ports() -> None:

@@ -39,6 +39,8 @@ TOO_MANY_PARTS = (
 )
 """Remedy for a run ended by ``LaneResult.too_many_parts``."""
 WHOLE = 1.0e-9
+_GROUPS_OF_RUN = ("plant", "thermal", "valve", "controller", "reference", "path", "sensors")
+"""Groups of parameters that every run has as a field of this name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,10 +179,6 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
         ordered = members[_alike_together(run, runs, members)] if own.is_adaptive and members.size > 1 else members
         batches.append((ordered, Batch(own, ticks, parameters[:, ordered], states[:, ordered])))
     return batches
-
-
-_GROUPS_OF_RUN = ("plant", "thermal", "valve", "controller", "reference", "path", "sensors")
-"""Groups of parameters that every run has as a field of this name."""
 
 
 def _parameters_of(run: Run, timing: LaneTiming) -> dict[str, Any]:

@@ -68,6 +68,10 @@ _NUMBERS: dict[str, tuple[str, Quantity]] = {
 }
 """Numbers of a gait file by path, each with its attribute; wide limits that exclude only typing errors."""
 _COEFFICIENT = Number("", "", plain=True)
+NORMATIVE = "falisse2019-subject1"
+"""Name of the default gait."""
+_DIGITS = 12
+"""Significant digits of a written coefficient; conversion from radians to degrees adds noise beyond these."""
 
 
 def declared(_document: Mapping[str, Any]) -> dict[str, Field]:
@@ -133,9 +137,6 @@ def json_schema() -> dict[str, Any]:
     return schema_of("ppafo gait", declared)
 
 
-NORMATIVE = "falisse2019-subject1"
-"""Name of the default gait."""
-
 _FILE = TomlKind("gait", "gait", resources.files("ppafo") / "gait" / "normative", DataError)
 
 
@@ -165,9 +166,6 @@ def load_gait(gait: str | Path = NORMATIVE) -> Gait:
 
 WRITTEN_UNITS: dict[str, str] = {"rad": "deg"}
 """Units of curves in a gait file by SI unit: degrees for angles; every other curve is in its SI unit."""
-
-_DIGITS = 12
-"""Significant digits of a written coefficient; conversion from radians to degrees adds noise beyond these."""
 
 
 def gait_toml(gait: Gait) -> str:

@@ -43,6 +43,8 @@ _STRIDE_KEYS = ("start", "toe_off", "end", "stance_share")
 _NOISE = 1e-9
 """Deviation or misfit [SI] below which it counts as rounding error."""
 _CAPTION = "The curves over the stride: mean, standard deviation between strides as a band, toe-off dashed."
+_HEAD = ("curve", "lowest", "highest", "unit", "between strides", "series error (RMS)")
+_STANCE = "#dddddd"
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,9 +91,6 @@ class GaitFound:
                 },
             }
         return document
-
-
-_HEAD = ("curve", "lowest", "highest", "unit", "between strides", "series error (RMS)")
 
 
 def gait_finding(gait: Gait, imported: ImportedGait | None = None) -> Finding[GaitFound]:
@@ -156,7 +155,6 @@ def _row(gait: Gait, name: str, imported: ImportedGait | None) -> tuple[str | No
     )
 
 
-_STANCE = "#dddddd"
 _STRIDE = Kind("Stride", "%")
 _PANELS: dict[str, Kind] = {
     "shank_angle": Kind("Shank angle (above 0: ankle in front of the knee)", "rad", "angle"),

@@ -49,6 +49,15 @@ REQUIRED = ("shank_angle", "ankle_angle")
 
 KNEE = ("knee_forward", "knee_up")
 """Curves of the knee acceleration, which scale with the square of the cadence."""
+LARGEST_CHANGE = 0.2
+"""Largest relative change of the recorded speed; beyond it, angles and moments would change too much."""
+SLOWEST_CONSTANT_WALK_RATIO = 1.03
+"""Speed [m/s] below which step length divided by cadence is no longer constant: Murakami and Otaka (2017), J Phys Ther
+Sci 29:819 (62 m/min)."""
+_RATE = 200.0
+"""Default sampling rate of the recording of a gait [Hz]."""
+_MAXIMUM_STRIDES = 100_000
+"""Largest number of strides in the recording of a gait."""
 
 
 def clinical_angle(angle: Floats) -> Floats:
@@ -227,14 +236,6 @@ def fit_curve(values: Floats, harmonics: int, deviation: float = 0.0) -> tuple[G
     return GaitCurve(float(solution[0]), tuple(cosines), tuple(sines), deviation), error
 
 
-LARGEST_CHANGE = 0.2
-"""Largest relative change of the recorded speed; beyond it, angles and moments would change too much."""
-
-SLOWEST_CONSTANT_WALK_RATIO = 1.03
-"""Speed [m/s] below which step length divided by cadence is no longer constant: Murakami and Otaka (2017), J Phys Ther
-Sci 29:819 (62 m/min)."""
-
-
 def speed_range(gait: Gait) -> tuple[float, float]:
     """Return the lowest and highest speed [m/s] to which a gait may be scaled: within 20 % of the recorded speed.
 
@@ -283,12 +284,6 @@ def _recorded_speed(gait: Gait) -> float:
             f"gait '{gait.name}' has no walking speed, so it cannot be scaled; import it with a walking speed"
         )
     return speed
-
-
-_RATE = 200.0
-"""Default sampling rate of the recording of a gait [Hz]."""
-_MAXIMUM_STRIDES = 100_000
-"""Largest number of strides in the recording of a gait."""
 
 
 def walk_recording(gait: Gait, strides: int) -> Recording:

@@ -17,6 +17,70 @@ from ppafo.gait.gait import HARMONICS, KNEE, Gait, fit_curve
 from ppafo.signals.recording import Floats
 from ppafo.wording import without_exponent
 
+STANCE_FRACTION = (0.45, 0.85)
+STRIDE_TIME = (0.5, 3.0)
+
+# Far from 0 and nearer to the half stride at which the other foot lies.
+_OTHER_FOOT = 0.3
+"""Least delay between ankle and shank [strides] that shows two different feet, which are half a stride apart."""
+_ALIKE, _UNLIKE = 0.65, 0.4
+"""Limits of the correlation with a usual ankle angle [-]: least at the best shift (0.76), largest without a shift."""
+_ALIKE_SHANK = 0.8
+"""Least correlation with a usual shank angle without a shift [-] (0.97); a reversed sign gives less."""
+SHANK_RANGE = (25.0, 120.0)
+ANKLE_RANGE = (5.0, 80.0)
+ANKLE_LIMITS = (40.0, 150.0)
+_TURNS = 2.0
+"""Least rotation of a standing foot [deg, RMS] that shows a wrong sign; recorded feet rotate by 0.5 to 1.5 deg."""
+_TURNED_BACK = 0.1
+"""Backward rotation of the shank over the standing foot, relative to its range [-], that shows a reversed sign.
+
+Recorded shanks rotate forward by 0.15 to 0.25 of the range.
+"""
+REMARKED_TILT, REFUSED_TILT = 5.0, 20.0
+"""Limits of the mean tilt of the standing foot in mid-stance [deg] for a remark, and for an error.
+
+Recorded feet on level ground have 0.5 to 4.6 deg, from the sole of the shoe and the placement of markers. A standing
+foot is not tilted by more than 20 deg: this is a heel of 6 cm on a foot of 17 cm from heel to ball, walking on the
+toes, or a ramp of 1 in 3. A larger tilt shows a wrong zero.
+"""
+CLEARLY_BETTER = 2.0
+"""Factor by which the opposite sign of a curve must fit better, or give a larger value, to reject the given sign."""
+MOMENT_PEAK = (0.05, 3.5)
+FORCE_PEAK = (0.5, 2.5)
+FORCE_MEAN = (0.25, 0.75)
+USUAL_FORCE_MEAN = (0.42, 0.58)
+"""Plausible mean of the vertical force [body weights]: both legs together carry 1, each half in symmetric walking."""
+UNDER_FOOT = (-0.2, 0.4)
+"""Plausible places of the centre of pressure in front of the ankle [m]: heel to toes of a large shoe, with room."""
+LEAST_ROLL = 0.005
+"""Least range of the centre of pressure in stance [m]; 0.15 to 0.25 in healthy walking, a few cm on the toes alone."""
+_ON_GROUND = 0.05
+"""Magnitude of the force [body weights] below which a force plate counts as unloaded."""
+_AFTER_TOE_OFF = 0.03
+"""Time after toe-off [strides] from which moments are checked; toe-off found from the shank has about this error."""
+_LEFT_IN_SWING = 0.25
+"""Largest moment in swing relative to the peak moment [-]; a swinging foot needs a few hundredths."""
+_FOOT_ALONE = 0.05
+"""Moment that is accepted in swing however weak the push-off [N m/kg]."""
+_UNCLEAR_MOMENT = 0.5
+"""Ratio of dorsiflexion to plantarflexion peak above which the sign is unclear; 0.05 to 0.2 in healthy walking."""
+SHANK_LENGTHS = (0.25, 0.6)
+"""Range of shank lengths [m] for the best fit, as a gait does not contain the length."""
+_FITS = 0.6
+"""Largest misfit to a rotation about the ankle [-, RMS] that counts as a fit; correct recordings have 0.3 to 0.46."""
+_LEFT_BY_ONE = 0.62
+"""Fraction of the misfit below which a correction explains it; correct knees in units of g leave 0.48 to 0.57."""
+KNEE_TRAVEL = (0.5, 80.0)
+"""Plausible range of the knee acceleration over a stride [m/s^2]."""
+KNEE_MEAN = 1.5
+"""Largest mean of the knee acceleration over a stride [m/s^2]; it is 0 for a periodic motion."""
+_HELD_BACK = 0.2
+"""Fraction of its range by which a knee must decelerate in the phase of usual acceleration to reject its sign [-].
+
+A measured knee accelerates by 0.8 to 0.9 of its range.
+"""
+
 
 @dataclass(frozen=True, slots=True)
 class MeanStride:
@@ -34,10 +98,6 @@ class MeanStride:
     def where(self, name: str) -> str:
         """Return file and name of a curve, at the start of a refusal."""
         return f"{self.file[name]}: {name}"
-
-
-STANCE_FRACTION = (0.45, 0.85)
-STRIDE_TIME = (0.5, 3.0)
 
 
 def check_gait(gait: Gait, file: str) -> None:
@@ -84,13 +144,6 @@ def check_stance(walk: MeanStride) -> None:
         )
 
 
-# Far from 0 and nearer to the half stride at which the other foot lies.
-_OTHER_FOOT = 0.3
-"""Least delay between ankle and shank [strides] that shows two different feet, which are half a stride apart."""
-_ALIKE, _UNLIKE = 0.65, 0.4
-"""Limits of the correlation with a usual ankle angle [-]: least at the best shift (0.76), largest without a shift."""
-_ALIKE_SHANK = 0.8
-"""Least correlation with a usual shank angle without a shift [-] (0.97); a reversed sign gives less."""
 _FINE = np.linspace(0.0, 1.0, 1000, endpoint=False)
 
 
@@ -122,27 +175,8 @@ def _lag(walk: MeanStride, usual: Gait, name: str) -> tuple[float, float, float]
     return float(_FINE[np.argmax(alike)]), float(np.max(alike)), float(alike[0])
 
 
-SHANK_RANGE = (25.0, 120.0)
-ANKLE_RANGE = (5.0, 80.0)
-ANKLE_LIMITS = (40.0, 150.0)
 MIDSTANCE = slice(15, 41)
 """Mid-stance samples [percent of the stride], in which the foot stands and the ankle rotates with the shank."""
-_TURNS = 2.0
-"""Least rotation of a standing foot [deg, RMS] that shows a wrong sign; recorded feet rotate by 0.5 to 1.5 deg."""
-_TURNED_BACK = 0.1
-"""Backward rotation of the shank over the standing foot, relative to its range [-], that shows a reversed sign.
-
-Recorded shanks rotate forward by 0.15 to 0.25 of the range.
-"""
-REMARKED_TILT, REFUSED_TILT = 5.0, 20.0
-"""Limits of the mean tilt of the standing foot in mid-stance [deg] for a remark, and for an error.
-
-Recorded feet on level ground have 0.5 to 4.6 deg, from the sole of the shoe and the placement of markers. A standing
-foot is not tilted by more than 20 deg: this is a heel of 6 cm on a foot of 17 cm from heel to ball, walking on the
-toes, or a ramp of 1 in 3. A larger tilt shows a wrong zero.
-"""
-CLEARLY_BETTER = 2.0
-"""Factor by which the opposite sign of a curve must fit better, or give a larger value, to reject the given sign."""
 
 
 def check_shank(walk: MeanStride) -> None:
@@ -280,26 +314,6 @@ def gait_file_remarks(gait: Gait) -> list[str]:
     return zero_remarks(gait.shank_angle.values_at(percent), gait.ankle_angle.values_at(percent))
 
 
-MOMENT_PEAK = (0.05, 3.5)
-FORCE_PEAK = (0.5, 2.5)
-FORCE_MEAN = (0.25, 0.75)
-USUAL_FORCE_MEAN = (0.42, 0.58)
-"""Plausible mean of the vertical force [body weights]: both legs together carry 1, each half in symmetric walking."""
-
-UNDER_FOOT = (-0.2, 0.4)
-"""Plausible places of the centre of pressure in front of the ankle [m]: heel to toes of a large shoe, with room."""
-LEAST_ROLL = 0.005
-"""Least range of the centre of pressure in stance [m]; 0.15 to 0.25 in healthy walking, a few cm on the toes alone."""
-_ON_GROUND = 0.05
-"""Magnitude of the force [body weights] below which a force plate counts as unloaded."""
-_AFTER_TOE_OFF = 0.03
-"""Time after toe-off [strides] from which moments are checked; toe-off found from the shank has about this error."""
-_LEFT_IN_SWING = 0.25
-"""Largest moment in swing relative to the peak moment [-]; a swinging foot needs a few hundredths."""
-_FOOT_ALONE = 0.05
-"""Moment that is accepted in swing however weak the push-off [N m/kg]."""
-
-
 def check_force_scale(file: str, force: Floats) -> None:
     """Raise DataError for a vertical force [body weights] whose unit or sign prevents the detection of heel strikes."""
     # One contact in a long record is less than 2 % of it.
@@ -327,10 +341,6 @@ def check_moment(walk: MeanStride) -> None:
         raise DataError(
             f"{where} reaches {without_exponent(peak, '.3g')} N m/kg (plausible: {low:g} to {high:g} N m/kg)"
         )
-
-
-_UNCLEAR_MOMENT = 0.5
-"""Ratio of dorsiflexion to plantarflexion peak above which the sign is unclear; 0.05 to 0.2 in healthy walking."""
 
 
 def moment_remarks(moment: Floats) -> list[str]:
@@ -403,13 +413,6 @@ def force_remarks(force: Floats) -> list[str]:
 FOOT_FLAT = slice(15, 43)
 """Samples [percent of the stride] in which the foot stands flat."""
 
-SHANK_LENGTHS = (0.25, 0.6)
-"""Range of shank lengths [m] for the best fit, as a gait does not contain the length."""
-
-_FITS = 0.6
-"""Largest misfit to a rotation about the ankle [-, RMS] that counts as a fit; correct recordings have 0.3 to 0.46."""
-_LEFT_BY_ONE = 0.62
-"""Fraction of the misfit below which a correction explains it; correct knees in units of g leave 0.48 to 0.57."""
 
 _G = STANDARD_GRAVITY
 _FACTORS = {
@@ -475,16 +478,6 @@ def _misfit(measured: Floats, expected: Floats) -> float:
     length = float(np.clip(np.sum(measured * expected) / square, *SHANK_LENGTHS))
     return float(np.sqrt(np.sum((measured - length * expected) ** 2) / square)) / length
 
-
-KNEE_TRAVEL = (0.5, 80.0)
-"""Plausible range of the knee acceleration over a stride [m/s^2]."""
-KNEE_MEAN = 1.5
-"""Largest mean of the knee acceleration over a stride [m/s^2]; it is 0 for a periodic motion."""
-_HELD_BACK = 0.2
-"""Fraction of its range by which a knee must decelerate in the phase of usual acceleration to reject its sign [-].
-
-A measured knee accelerates by 0.8 to 0.9 of its range.
-"""
 
 _PARTS = {"knee_forward": ((-0.3, 0.0), (0.3, 0.6)), "knee_up": ((0.0, 0.3), (0.4, 0.7))}
 """Intervals about toe-off [fractions of the swing] of acceleration (forward, up) and of deceleration."""

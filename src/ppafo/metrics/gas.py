@@ -12,6 +12,10 @@ from ppafo.model.declaration import PlainFunction
 from ppafo.signals import Recording
 from ppafo.signals.meter import NO_ENERGY, NO_GAS, EnergySample, GasSample, MeterKind, ReferenceSummary, Sample
 
+_BALANCE = ("supplied_mass", "vented_mass", "mass_1", "mass_2")
+ENERGIES = ("supplied_enthalpy", "vented_enthalpy", "wall_heat", "gas_work", "gas_energy")
+_EFFORT = ("torque", "angle", "supplied_mass")
+
 
 def gained(recording: Recording, channels: tuple[str, ...], function: PlainFunction | None = None) -> float:
     """Increase of a cumulative channel over a recording, or a function of several increases [SI]."""
@@ -191,11 +195,8 @@ def of_gas(supplied: Floats, work: Floats) -> Floats:
     return ratio(gas_taken(supplied), work)
 
 
-_BALANCE = ("supplied_mass", "vented_mass", "mass_1", "mass_2")
-ENERGIES = ("supplied_enthalpy", "vented_enthalpy", "wall_heat", "gas_work", "gas_energy")
 WITH_ENERGY_BALANCE = frozenset({"temperature_1", "temperature_2", *ENERGIES})
 """Channels present only with an energy balance of the gas."""
-_EFFORT = ("torque", "angle", "supplied_mass")
 
 
 def _of_gains(

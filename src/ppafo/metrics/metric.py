@@ -19,6 +19,7 @@ from ppafo.units import from_si
 from ppafo.wording import known_names
 
 Floats = NDArray[np.float64]
+_WAY = "the largest way of the reference from the start"
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,9 +137,6 @@ class MetricKind:
     traced: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
     of_reference: str = ""
-
-
-_WAY = "the largest way of the reference from the start"
 
 
 def for_each_reference(kinds: tuple[MetricKind, ...], rename: Callable[[str, str], str]) -> tuple[MetricKind, ...]:

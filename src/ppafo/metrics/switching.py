@@ -39,6 +39,8 @@ SHUT = 1.0e-6
 """Largest command of a valve that is off [-], above rounding error."""
 
 _NEEDED = ("torque", "reference")
+UNDECIDED = 0.0
+_REVERSALS = "torque reversals of more than 5 % of the largest reference"
 
 
 def switchings(recording: Recording) -> float:
@@ -126,9 +128,6 @@ class Swing(NamedTuple):
     highest: float
 
 
-UNDECIDED = 0.0
-
-
 def next_swing(state: Swing, value: float, swing: float) -> Swing:
     """Update a reversal counter with a value; ``swing`` is the smallest reversal, in the unit of the value."""
     # The sign of ``turns`` is the way and its size counts: a turn changes the one and adds 1 to the other.
@@ -186,8 +185,6 @@ def _where_swinging(readings: Readings, span: Floats, count: Floats) -> Floats:
     found: Floats = choose(span > 0.0, choose(readings.course.largest != 0.0, count, math.nan), math.nan)
     return found
 
-
-_REVERSALS = "torque reversals of more than 5 % of the largest reference"
 
 _OSCILLATIONS = tuple(
     MetricKind(

@@ -18,6 +18,7 @@ ONE_INSTANT = frozenset(
     f"final_{name}error" for name in ("" if controlled == TORQUE else f"{controlled}_" for controlled in CONTROLLED)
 )
 """Metrics of a single instant, which are arbitrary while the controlled quantity oscillates."""
+_RMS = "root-mean-square torque error"
 
 
 def error_of(recording: Recording) -> Floats:
@@ -118,8 +119,6 @@ def read_rms_error_hold(readings: Readings) -> Floats:
     _, length = spans(readings)
     return root(readings.meters[SQUARED_ERROR.name].on_hold / length)
 
-
-_RMS = "root-mean-square torque error"
 
 _OF_TORQUE = (
     MetricKind("rms_error", "N m", f"{_RMS} over the whole run", _NEEDED, rms_error, read_rms_error, (SQUARED_ERROR,)),

@@ -24,6 +24,8 @@ NEARLY_FLAT = 0.05235987755982989
 
 Assumed: pad and sole of a loaded heel yield by some millimetres, so that the toes touch before the foot is flat.
 """
+SETTLES = 3.0
+"""A foot that landed on its toes stands on its heel after the time to heel-off divided by this number."""
 
 
 class Ankle(NamedTuple):
@@ -96,10 +98,6 @@ def landing(
     difference = angle - (now.ankle if keeps_gait > 0.5 else flat_angle) if falls_flat else offset
     difference = angle - now.ankle if rises else difference
     return Landing(contact=after, offset=difference, strikes=1.0 if strikes else 0.0, leaves=1.0 if leaves else 0.0)
-
-
-SETTLES = 3.0
-"""A foot that landed on its toes stands on its heel after the time to heel-off divided by this number."""
 
 
 def heel_fraction(contact: float, timing: GaitTiming, phase: float, toes_first: float) -> float:

@@ -20,6 +20,16 @@ _MAXIMUM_DOUBLINGS = 1100
 _TERMS_OF_EXPONENTIAL = 14
 _TERMS_OF_LOGARITHM = 12
 _TERMS_OF_SINE = 9
+TURN = 6.283185307179586
+QUARTER_TURN = 1.5707963267948966
+TURNS_OF_RADIAN = 1.0 / TURN
+ROUNDING = 1.5 * 2.0**52
+"""Added to a number and subtracted again, it leaves the nearest whole number, without a branch or an integer."""
+DOUBLINGS = 12
+"""Number of doublings from the small fraction of a step, at which a series is evaluated, to the whole step."""
+SMALLEST_FRACTION = 0.5**DOUBLINGS
+TERMS = 9
+"""Number of terms of the series that are doubled, including order 0."""
 
 
 def exponential(exponent: float) -> float:
@@ -92,19 +102,6 @@ def sine_and_cosine(turns: Numeric) -> tuple[Numeric, Numeric]:
     sign = 1.0 - 2.0 * (is_later - 2.0 * np.floor(0.5 * is_later))
     even = 1.0 - is_odd
     return sign * (even * sine + is_odd * cosine), sign * (even * cosine - is_odd * sine)
-
-
-TURN = 6.283185307179586
-QUARTER_TURN = 1.5707963267948966
-TURNS_OF_RADIAN = 1.0 / TURN
-ROUNDING = 1.5 * 2.0**52
-"""Added to a number and subtracted again, it leaves the nearest whole number, without a branch or an integer."""
-
-DOUBLINGS = 12
-"""Number of doublings from the small fraction of a step, at which a series is evaluated, to the whole step."""
-SMALLEST_FRACTION = 0.5**DOUBLINGS
-TERMS = 9
-"""Number of terms of the series that are doubled, including order 0."""
 
 
 def sine_and_cosine_of_turns(turns: float) -> tuple[float, float]:

@@ -11,6 +11,8 @@ from ppafo.constants import MOLAR_MASSES
 from ppafo.model.columns import over_runs, root
 from ppafo.model.elementary import power
 
+_WEBBOOK = "NIST Chemistry WebBook, SRD 69, at 298 K and 1 bar"
+
 
 @dataclass(frozen=True, slots=True)
 class _Species:
@@ -21,8 +23,6 @@ class _Species:
     heat_capacity_ratio: float
     source: str
 
-
-_WEBBOOK = "NIST Chemistry WebBook, SRD 69, at 298 K and 1 bar"
 
 SPECIES: dict[str, _Species] = {
     species.name: species

@@ -24,6 +24,8 @@ Nodes = tuple[int, float]
 
 # More halvings than a float has bits, so that the result does not depend on where they began.
 _HALVINGS = 80
+_NARROW_ENOUGH = 1e-9
+_MAXIMUM_HALVINGS = 60
 
 
 class FluidTable(NamedTuple):
@@ -111,10 +113,6 @@ def place_among(nodes: Column, at: float) -> Nodes:
     index = min(max(bisect_right(nodes, at) - 1, 0), len(nodes) - 2)
     weight = (at - nodes[index]) / (nodes[index + 1] - nodes[index])
     return index, min(max(weight, 0.0), 1.0)
-
-
-_NARROW_ENOUGH = 1e-9
-_MAXIMUM_HALVINGS = 60
 
 
 class BottleWall(NamedTuple):

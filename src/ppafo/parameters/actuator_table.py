@@ -42,6 +42,15 @@ _FELT = 0.01
 """Standard deviation of the torque from which rounded volumes are smoothed, relative to the largest torque [-]."""
 _ROUNDING = 1.0e-9
 """Largest negative volume, or fall with pressure, that counts as rounding error, relative to the largest volume [-]."""
+_NEEDED = ("angle", "pressure", "volume_1")
+_NEAREST_ANGLES = 0.01
+"""Least distance of two angles, as a fraction of their range [-], for a smooth spline."""
+_NEAREST_PRESSURES = 1.0
+"""Least distance of two pressures [Pa] that are not the same pressure."""
+_STEPS = (1, 2, 5, 10, 20, 50, 100)
+"""Possible rounding steps of readings, in units of the last digit."""
+_TELLING = 10
+"""Number of different values from which a common step is no coincidence."""
 
 
 class _VolumeColumn(NamedTuple):
@@ -58,15 +67,6 @@ COLUMNS = {
     "volume_1": _VolumeColumn("m^3", 1.0, "mL"),
     "volume_2": _VolumeColumn("m^3", 1.0, "mL"),
 }
-_NEEDED = ("angle", "pressure", "volume_1")
-_NEAREST_ANGLES = 0.01
-"""Least distance of two angles, as a fraction of their range [-], for a smooth spline."""
-_NEAREST_PRESSURES = 1.0
-"""Least distance of two pressures [Pa] that are not the same pressure."""
-_STEPS = (1, 2, 5, 10, 20, 50, 100)
-"""Possible rounding steps of readings, in units of the last digit."""
-_TELLING = 10
-"""Number of different values from which a common step is no coincidence."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -55,6 +55,8 @@ from ppafo.units import check_unit
 from ppafo.wording import nearest_name
 
 _FILE = TomlKind("parameter set", "parameters", resources.files("ppafo.parameters") / "sets", ParameterError)
+_ORDER = "gas", "actuator", "friction", "foot_plate", "supply", "flow", SECTION, "reported", "valves"
+"""Sections with values, in their order."""
 
 
 def list_sets() -> tuple[str, ...]:
@@ -290,8 +292,6 @@ _HEAD: Mapping[str, Field] = {
     "joint.negative": Words("what a falling angle is called; the opposite unless given", pattern=JOINT_WORDS),
 }
 """Keys of a parameter set file before its sections of values."""
-_ORDER = "gas", "actuator", "friction", "foot_plate", "supply", "flow", SECTION, "reported", "valves"
-"""Sections with values, in their order."""
 
 
 def parameter_set_toml(parameter_set: ParameterSet) -> str:

@@ -43,6 +43,7 @@ CONFIDENCE = 0.95
 _Origin = Annotated[Origin, Words("origin of the value", allowed=get_args(Origin))]
 _Source = Annotated[str, Words("source: page, equation, data sheet, recording")]
 _Note = Annotated[str, Words("reason, conflict or remark")]
+SOURCE = "override"
 
 
 @dataclass(frozen=True, slots=True)
@@ -369,9 +370,6 @@ def entry_text(entry: Entry | TextEntry | FlagEntry) -> str:
     if isinstance(entry, Entry):
         return format_quantity(entry.value, entry.unit)
     return str(entry.value).lower() if isinstance(entry, FlagEntry) else entry.value
-
-
-SOURCE = "override"
 
 
 def overridden_paths(parameter_set: ParameterSet) -> frozenset[str]:

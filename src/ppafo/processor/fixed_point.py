@@ -19,6 +19,10 @@ MOST_PLACES = 30
 """Largest right shift of a 32-bit product [bits]."""
 SHARPENED = int(1.0 / SHARPNESS)
 """Reciprocal of the smallest opening, relative to full opening, with full dead-band compensation [-]."""
+FEWEST_BITS, MOST_BITS = 8, 14
+COMMAND_STEPS = 1000
+"""Integer command of a full command: half the timer ticks of a proportional valve's pulse."""
+LARGEST_READING: int = 2**MOST_BITS - 1
 
 
 def fraction_of(value: int, fraction: int) -> int:
@@ -74,11 +78,6 @@ def gain_of(factor: float) -> tuple[float, float]:
         fraction = math.floor(math.ldexp(factor, places) + 0.5)
     return float(min(fraction, LARGEST_FRACTION)), float(places)
 
-
-FEWEST_BITS, MOST_BITS = 8, 14
-COMMAND_STEPS = 1000
-"""Integer command of a full command: half the timer ticks of a proportional valve's pulse."""
-LARGEST_READING: int = 2**MOST_BITS - 1
 
 SETTINGS = (
     Quantity("converter_bits", "", "bits of the converter, a whole number", 12.0, float(FEWEST_BITS), float(MOST_BITS)),

@@ -28,6 +28,10 @@ _FORM = re.compile(r"[-+]?\d*(\.\d+)?[efgd]")
 """Pattern of a number format, which somebody may give as the quantity."""
 YES_OR_NO = "; 1: yes, 0: no"
 """Remark in the label of a number that answers a question; a mean of several runs lies between."""
+_MORE_DIGITS = 3
+"""Largest number of digits added to tell the limits of an interval apart."""
+_LONG = 120.0
+"""Duration [s] above which durations and time axes are in minutes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,13 +161,9 @@ def _interval_text(interval: ConfidenceInterval, form: str, number: Callable[[fl
     return f"{value} [{low}, {high}]"
 
 
-_MORE_DIGITS = 3
-"""Largest number of digits added to tell the limits of an interval apart."""
 PLAIN = Kind()
 """Kind of dimensionless numbers, and of texts."""
 TIME = Kind("Time", "s", "time")
-_LONG = 120.0
-"""Duration [s] above which durations and time axes are in minutes."""
 
 
 def of_metric(name: str, form: str = ".4g") -> Kind:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 _HOLLOW = {"linestyle": "", "markerfacecolor": "none"}
 _READING = {"linestyle": "none", "markersize": 5, "markeredgewidth": 1.1}
+_ROUNDING = 1.0e-9
+"""Largest residual, relative to the range of the samples, that counts as zero [-]."""
 
 
 class _ReadingStyle(NamedTuple):
@@ -38,8 +40,6 @@ _LOOKS = {
     "dots": _ReadingStyle(BLACK, 400, {"marker": ".", "markersize": 2.6, "linestyle": ""}),
 }
 """Styles of measured points by name."""
-_ROUNDING = 1.0e-9
-"""Largest residual, relative to the range of the samples, that counts as zero [-]."""
 
 
 def readings_mark(label: str, x: Floats, y: Floats, look: str = "measured") -> Mark:

@@ -38,6 +38,13 @@ DASHES = MappingProxyType(
 """Dashes by colour, for lines of several colours, some of which are equal in greyscale; other colours are solid."""
 MARKERS = MappingProxyType({VERMILION: "s", GREEN: "^", ORANGE: "D", PURPLE: "v", BLACK: "P", GREY: "X"})
 """Marker of a data series by its colour; the default is a circle."""
+RESOLUTION = 150
+"""Resolution of a PNG file [dots per inch]."""
+FULL_WIDTH = 5.7
+"""Width of a figure from which on its font is 10 pt [inches]: 145 mm, the text of a thesis."""
+_SMALLEST_SCALE, _SMALLEST_TEXT = 0.8, 7.0
+"""Smallest font scale relative to a figure of full width (8 pt for 10 pt), and smallest font size [points]."""
+_INCHES_PER_METRE = 1.0 / 0.0254
 
 
 class DrawingStyle(NamedTuple):
@@ -67,8 +74,6 @@ def look_of_valve(kind: str) -> DrawingStyle:
     return _VALVES.get(kind, ACTUAL)
 
 
-RESOLUTION = 150
-"""Resolution of a PNG file [dots per inch]."""
 _SETTINGS: Any = MappingProxyType(
     {
         "font.family": "sans-serif",
@@ -110,11 +115,6 @@ _FONT_SIZES = MappingProxyType(
     {"font.size": 10.0, "axes.titlesize": 11.0, "axes.labelsize": 10.0, "legend.fontsize": 9.0}
 )
 """Font sizes at full width [points]."""
-FULL_WIDTH = 5.7
-"""Width of a figure from which on its font is 10 pt [inches]: 145 mm, the text of a thesis."""
-_SMALLEST_SCALE, _SMALLEST_TEXT = 0.8, 7.0
-"""Smallest font scale relative to a figure of full width (8 pt for 10 pt), and smallest font size [points]."""
-_INCHES_PER_METRE = 1.0 / 0.0254
 _width: ContextVar[float | None] = ContextVar("_width", default=None)
 
 

@@ -60,6 +60,7 @@ SENSORS = {
 
 The order determines the streams: a new channel must come last, so that the other streams do not change.
 """
+_SENSED = ("angle", "pressure_1", "pressure_2", "supply_pressure", "dorsiflexion_pressure")
 
 
 def random_stream(seed: int, channel: str, *more: int) -> np.random.Generator:
@@ -226,7 +227,6 @@ _STEADY: dict[str, Callable[[Device, Preset, int], dict[str, Floats]]] = {
     "valve-map": _valve_map,
 }
 """Experiments whose readings are taken at rest, and the functions that return their true values [SI] by channel."""
-_SENSED = ("angle", "pressure_1", "pressure_2", "supply_pressure", "dorsiflexion_pressure")
 _MOVING: dict[str, tuple[str, ...]] = {
     "free-decay": ("angle",),
     "vane-leak": ("pressure_1", "pressure_2"),

@@ -38,6 +38,16 @@ _PARTS = 20
 """Number of parts of a signal, whose means show a lasting change."""
 _SMOOTH = 1.0e-6
 """Deviation from the line between neighbours, relative to the range [-], that counts as rounding."""
+_ROUNDING = 1.0e-9
+"""Smallest difference of values, relative to their range [-], that is a converter step and not file rounding."""
+_SHARE_THAT_DIFFERS = 0.5
+"""Largest fraction of distinct values [-] in a signal with a visible converter step."""
+_SHARE_OF_LAGS = 0.1
+"""Largest correlation time of noise, relative to the recording length [-]; slower residuals are model error."""
+_BY_CHANCE = 8.0
+"""Significance of correlated noise: four standard errors of the quartile of differences, times root of count."""
+_QUARTER = 0.31864
+"""Lower quartile of the absolute value of a standard normal variable [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,12 +166,6 @@ def _five_around(values: Floats) -> Floats:
     return np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, mode="reflect"), 5)
 
 
-_ROUNDING = 1.0e-9
-"""Smallest difference of values, relative to their range [-], that is a converter step and not file rounding."""
-_SHARE_THAT_DIFFERS = 0.5
-"""Largest fraction of distinct values [-] in a signal with a visible converter step."""
-
-
 def resolution_of(values: Floats) -> float:
     """Return the converter resolution [unit of the values], the smallest difference; 0 if none is visible.
 
@@ -200,16 +204,6 @@ def _third_differences(values: Floats, lag: int) -> Floats:
     """Return the absolute third differences of samples ``lag`` apart, which vanish for a parabola."""
     first, second, third, fourth = (values[place * lag : values.size - (3 - place) * lag] for place in range(4))
     return np.asarray(np.abs(fourth - 3.0 * third + 3.0 * second - first))
-
-
-_SHARE_OF_LAGS = 0.1
-"""Largest correlation time of noise, relative to the recording length [-]; slower residuals are model error."""
-
-_BY_CHANCE = 8.0
-"""Significance of correlated noise: four standard errors of the quartile of differences, times root of count."""
-
-_QUARTER = 0.31864
-"""Lower quartile of the absolute value of a standard normal variable [-]."""
 
 
 def correlated_noise_of(values: Floats) -> float:

@@ -10,6 +10,14 @@ from typing import Any, NamedTuple
 
 WALK, REQUESTED, LED_SHANK = "walk", "requested torque", "shank of a gait"
 """Requirements of metrics besides channels: walk, requested torque, shank led by a gait."""
+SAME_LEVEL = 1.0e-9
+"""Largest difference of equal levels of a reference, relative to its largest value [-]."""
+SLOW_RATE = 0.75
+"""Largest rate of a slow reference, relative to its largest value [1/s]: a lag behind it is within the largest one."""
+START_UP = 1.0
+"""Time for a value to meet a repeated reference and to settle [s], at most half of the run."""
+SHORTEST_REST, SHORTEST_SHARE, FEWEST_OF_REST = 0.1, 0.1, 2.0
+"""Length of the shortest stretch [s] or, if that is less, divided by the run's [-]; and its least number of samples."""
 
 
 class FootSample(NamedTuple):
@@ -121,16 +129,6 @@ class ReferenceSummary(NamedTuple):
     rests: float = 0.0
     is_new: float = 0.0
     in_first_half: float = 0.0
-
-
-SAME_LEVEL = 1.0e-9
-"""Largest difference of equal levels of a reference, relative to its largest value [-]."""
-SLOW_RATE = 0.75
-"""Largest rate of a slow reference, relative to its largest value [1/s]: a lag behind it is within the largest one."""
-START_UP = 1.0
-"""Time for a value to meet a repeated reference and to settle [s], at most half of the run."""
-SHORTEST_REST, SHORTEST_SHARE, FEWEST_OF_REST = 0.1, 0.1, 2.0
-"""Length of the shortest stretch [s] or, if that is less, divided by the run's [-]; and its least number of samples."""
 
 
 def is_away(reference: float, last: float, tolerance: float) -> bool:

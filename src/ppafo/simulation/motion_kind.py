@@ -19,6 +19,12 @@ if TYPE_CHECKING:
     from ppafo.model.columns import Problem
     from ppafo.signals.recording import Recording
 
+VANE, WALK = "vane", "walk"
+"""File layouts of a vane alone and of a walking leg; the walking motion is also named ``walk``."""
+VANE_MOTIONS = ("free", "locked", "prescribed", "leg")
+"""Motions of a vane alone in this package."""
+_GROUP = "ppafo.motions"
+
 
 @dataclass(frozen=True, slots=True)
 class RunTimes:
@@ -45,9 +51,6 @@ class LawSignals(NamedTuple):
 
 Measured = tuple["Recording", Mapping[str, "Metric"]]
 """Recording and metrics of a run."""
-
-VANE, WALK = "vane", "walk"
-"""File layouts of a vane alone and of a walking leg; the walking motion is also named ``walk``."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,10 +122,6 @@ class ProfileTable:
     own: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
 
-VANE_MOTIONS = ("free", "locked", "prescribed", "leg")
-"""Motions of a vane alone in this package."""
-
-_GROUP = "ppafo.motions"
 MOTIONS: Kinds[MotionKind] = Kinds(_GROUP, "motion", MotionKind, declared_kinds(_GROUP))
 """Motions of a vane alone, and of a leg that walks with the device."""
 

@@ -27,6 +27,9 @@ Thousands = Literal["point", "comma", "apostrophe", "blank"]
 
 _Place = Annotated[int | str | None, Words("number of the column from 1, or its name", form=int)]
 _Sign = Literal[1, -1]
+_KEYS_OF_TIME = ("rate", "date", "date_order", "clock")
+_MOST_SHOWN = 20
+"""Largest number of names listed in a message."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,9 +142,6 @@ def in_map(map_name: str) -> AbstractContextManager[None]:
     return refused_as(DataError, f"column map {one_line(map_name)}", DataError) if map_name else nullcontext()
 
 
-_KEYS_OF_TIME = ("rate", "date", "date_order", "clock")
-
-
 def check_sources(columns: ColumnMap) -> None:
     """Raise DataError for a missing time, a channel without exactly one source, or a misplaced key."""
     if TIME not in columns.channels:
@@ -174,10 +174,6 @@ class MappedTable(NamedTuple):
     rows: Sequence[int]
     noun: str
     kind: RecordingKind
-
-
-_MOST_SHOWN = 20
-"""Largest number of names listed in a message."""
 
 
 def shown_names(names: Collection[str]) -> str:

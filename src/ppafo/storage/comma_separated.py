@@ -32,6 +32,8 @@ _LEVEL = "Pa_a"
 _ONLY_SIMULATED = "supplied_mass"
 _MAPPED = "; other names are read through a column map"
 _NO_TIMES = f'for a table without a time column, give the sample rate in the map: {TIME} = {{ rate = "100 Hz" }}'
+_SIMILAR = 0.8
+"""Similarity [-] above which a word counts as a misspelt kind; 'measurement: run 3' in a comment stays below."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,8 +134,6 @@ _MARKS: dict[RecordingKind, str] = {
 
 _MARK = re.compile(r"#\s*(\w+):.*")
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*", re.ASCII)
-_SIMILAR = 0.8
-"""Similarity [-] above which a word counts as a misspelt kind; 'measurement: run 3' in a comment stays below."""
 
 
 def write_csv(path: str | Path, recording: Recording) -> Path:

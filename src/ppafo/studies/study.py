@@ -29,6 +29,8 @@ DEFAULT_SEED = 1
 """Default random seed of the draws of a study."""
 _QUANTILES = Many(Quantity("", "", "", None, 0.0, 1.0, plain=True), "of the bands; from 0 to 1", least=1)
 _METRICS = Many(Words("", True), "names of metrics, or 'all'", words=("all",))
+NO_SAMPLE = "'sample' is missing: distributions need [sample] with method and runs"
+"""Error message for a study with distributions but without a number of draws."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,10 +123,6 @@ class SamplingPlan:
         Number("", "draws; each is run in every configuration", minimum=1, maximum=MAXIMUM_RUNS, whole=True)
     )
     seed: int = keyed(Number("", "", minimum=0, maximum=LARGEST_SEED, whole=True), DEFAULT_SEED)
-
-
-NO_SAMPLE = "'sample' is missing: distributions need [sample] with method and runs"
-"""Error message for a study with distributions but without a number of draws."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)

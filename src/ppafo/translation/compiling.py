@@ -21,6 +21,17 @@ LONGEST_COMPILING = 300.0
 """Time limit of a compilation [s]; the longest program takes a tenth of it."""
 # Between two looks at an interrupt while a compiler runs [s].
 _PAUSE = 0.25
+_INTERRUPTED = (-signal.SIGINT, -signal.SIGTERM)
+_PASSING = (
+    "no space left",
+    "quota exceeded",
+    "temporary file",
+    "cannot allocate memory",
+    "out of memory",
+    "killed signal",
+    "cache directory",
+)
+"""Fragments of compiler messages, in lower case, that mean a temporary lack of resources."""
 
 
 def asked(
@@ -84,19 +95,6 @@ def complaint(done: "subprocess.CompletedProcess[str]") -> str:
     # gcc and clang say it on stderr, some wrappers on stdout.
     lines = [*done.stderr.splitlines(), *done.stdout.splitlines(), f"it returned {done.returncode}"]
     return one_line(next((text for text in lines if "error" in text), next(filter(str.strip, lines))))
-
-
-_INTERRUPTED = (-signal.SIGINT, -signal.SIGTERM)
-_PASSING = (
-    "no space left",
-    "quota exceeded",
-    "temporary file",
-    "cannot allocate memory",
-    "out of memory",
-    "killed signal",
-    "cache directory",
-)
-"""Fragments of compiler messages, in lower case, that mean a temporary lack of resources."""
 
 
 def compile_library(source: str, library: Path, command: Sequence[str], flags: Sequence[str]) -> None:

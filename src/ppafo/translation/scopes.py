@@ -9,6 +9,7 @@ from ppafo.translation.typed import Function, Statement, Term
 from ppafo.translation.value_types import INT, Type
 
 Block = tuple[Statement, ...]
+_WITH_PARTS = (ast.expr, ast.stmt, ast.arguments)
 
 
 @dataclass(slots=True)
@@ -245,9 +246,6 @@ def _nodes(definition: ast.FunctionDef) -> Iterator[ast.AST]:
                     waiting += filter(None, inner)
                 elif isinstance(inner, _WITH_PARTS):
                     waiting.append(inner)
-
-
-_WITH_PARTS = (ast.expr, ast.stmt, ast.arguments)
 
 
 def _counts_up(node: ast.For) -> bool:

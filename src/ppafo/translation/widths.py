@@ -15,6 +15,9 @@ from ppafo.translation.value_types import BOOL, INT, INT16, INT32, Items, Row, S
 
 # Loops are gone through turn by turn: more would take long, and no fixed-point law has them.
 MOST_TURNS = 64
+Range: TypeAlias = "IntegerRange | tuple[Range, ...]"
+"""Range of a number, or ranges of row fields or tuple items."""
+Names: TypeAlias = "dict[str, Range]"
 
 
 class IntegerRange(NamedTuple):
@@ -23,10 +26,6 @@ class IntegerRange(NamedTuple):
     low: int
     high: int
 
-
-Range: TypeAlias = "IntegerRange | tuple[Range, ...]"
-"""Range of a number, or ranges of row fields or tuple items."""
-Names: TypeAlias = "dict[str, Range]"
 
 TRUTH = IntegerRange(0, 1)
 _WIDTHS = ((INT16, IntegerRange(-(2**15), 2**15 - 1)), (INT32, IntegerRange(-(2**31), 2**31 - 1)))

@@ -18,6 +18,10 @@ from ppafo.wording import set_within, without_exponent
 
 P = ParamSpec("P")
 R = TypeVar("R")
+NAMED = ("gas mass", "body length", "duration", "fraction")
+"""Kinds of quantity that share an SI unit with another kind, so that callers must name them."""
+GAUGE_ZERO = "gauge_zero"
+"""Key of the absolute pressure displayed as gauge zero, among display units by SI unit."""
 
 
 class Units(NamedTuple):
@@ -61,8 +65,6 @@ QUANTITIES: Mapping[str, Units] = MappingProxyType(
     }
 )
 """Display units by kind of quantity."""
-NAMED = ("gas mass", "body length", "duration", "fraction")
-"""Kinds of quantity that share an SI unit with another kind, so that callers must name them."""
 _OF_UNIT = {
     **{units.si: quantity for quantity, units in QUANTITIES.items() if quantity not in NAMED},
     # Metrics and channels write Pa for a level; of the quantities in kg the plain one is meant.
@@ -72,8 +74,6 @@ _OF_UNIT = {
 """Kind of quantity by SI unit."""
 _WRITTEN = {"Pa": "Pa_a", "-": "1"}
 """Unit as written in files, by unit of a metric or channel."""
-GAUGE_ZERO = "gauge_zero"
-"""Key of the absolute pressure displayed as gauge zero, among display units by SI unit."""
 
 _chosen: ContextVar[Mapping[str, str]] = ContextVar("_chosen", default=MappingProxyType({}))
 

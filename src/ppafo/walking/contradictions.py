@@ -18,6 +18,11 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of
 from ppafo.walking.wearer import Wearer
 
+_OF_DEVICE = ("actuator.angle_max", "actuator.angle_min")
+"""End stops of the device, which cannot be set by a key of a walk file."""
+SHORTEST_FIRST, LONGEST_FIRST = 0.5, 2.0
+"""Limits of the expected time of the first stride, in strides of the gait."""
+
 
 @dataclass(frozen=True, slots=True)
 class _Pair:
@@ -53,13 +58,9 @@ PAIRS = (
 _IS_BAD = {"below": operator.ge, "above": operator.le, "at most": operator.gt, "at least": operator.lt}
 
 
-_OF_DEVICE = ("actuator.angle_max", "actuator.angle_min")
-"""End stops of the device, which cannot be set by a key of a walk file."""
 _PHASES = np.linspace(0.0, 1.0, 200, endpoint=False)
 BEYOND_STOP = math.radians(5.0)
 """Angle [rad] by which a gait may exceed an end stop: the accuracy of the angle zero in most known recordings."""
-SHORTEST_FIRST, LONGEST_FIRST = 0.5, 2.0
-"""Limits of the expected time of the first stride, in strides of the gait."""
 
 
 def contradictions(scenario: Scenario) -> Iterator[Contradiction]:

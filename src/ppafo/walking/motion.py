@@ -21,6 +21,13 @@ from ppafo.walking.bottle.supply import BottleSupply
 from ppafo.walking.declaration import FORCES, declared
 from ppafo.walking.wearer import WEARER, Wearer, who_walks
 
+SHORTEST_STRIDES = 5
+"""Least number of strides of a walk; the controller adapts during the first two."""
+LONGEST_MINUTES = 60.0
+"""Longest duration of a walk [min]."""
+_SECTIONS = "wearer", "controller", "sensors", "run", "gas_model", "supply_line"
+"""Sections with numbers of a walk, in the order in which they are listed."""
+
 
 @dataclass(frozen=True, slots=True)
 class WalkMotion:
@@ -74,20 +81,11 @@ def person_remarks(scenario: Scenario) -> list[str]:
     return [who_walks(motion.wearer, motion.gait, motion.wearer_origin), *remarks]
 
 
-SHORTEST_STRIDES = 5
-"""Least number of strides of a walk; the controller adapts during the first two."""
-LONGEST_MINUTES = 60.0
-"""Longest duration of a walk [min]."""
-
 PLACES: Mapping[str, tuple[str, ...]] = {
     **{f"wearer.{quantity.name}": ("motion", "wearer", quantity.name) for quantity in WEARER},
     **{f"sensors.{name}": ("motion", "forces", name) for name in FORCES},
 }
 """Attributes or keys that lead to the numbers of a walk that other scenarios do not have, by path."""
-
-
-_SECTIONS = "wearer", "controller", "sensors", "run", "gas_model", "supply_line"
-"""Sections with numbers of a walk, in the order in which they are listed."""
 
 
 def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:

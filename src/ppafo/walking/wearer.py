@@ -44,6 +44,7 @@ SCALED_MASS = (0.6, 1.7)
 About the 2nd to the 98th percentile of adults for a subject in their middle: 45 to 120 kg for 72 kg. Children do not
 only have less mass but walk differently.
 """
+STATURE, BODY_MASS = "wearer.stature", "wearer.body_mass"
 
 
 class HeelRocker(NamedTuple):
@@ -157,9 +158,6 @@ _SHARES: Mapping[str, float] = {
     for name, (of_mass, of_stature) in SCALING.items()
 } | {"shank_length": SHANK_SHARE}
 """Numbers of the paper subject's leg divided by the powers of body mass and stature from ``SCALING``."""
-
-
-STATURE, BODY_MASS = "wearer.stature", "wearer.body_mass"
 
 
 def links_of_stature(document: Mapping[str, Any]) -> Graph:

@@ -55,6 +55,8 @@ _ROUNDING = 1.0e-9
 """Fraction of the range of a profile below which a difference counts as rounding."""
 _MOMENT = 1.0e-5
 """Duration [s] of the torque step between two repetitions if the end differs from the start."""
+_SECONDS_PER_HOUR = 3600.0
+_LARGEST_DENOMINATOR = 10**6
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,8 +214,6 @@ def _profile_of_table(table: ProfileSection, where: str) -> tuple[Floats, Floats
     return time, table.scale * torque
 
 
-_SECONDS_PER_HOUR = 3600.0
-_LARGEST_DENOMINATOR = 10**6
 _FACTORS = Many(
     Quantity("", "", "", None, 0.0, 1000.0, plain=True),
     "factors by which each gain of the controller is multiplied",

@@ -34,6 +34,8 @@ PAIR = "solenoid"
 """Name of the walk with direct event control."""
 KEEPS_GAIT = "wearer.keeps_gait=1"
 """Override of a walk for a nondisabled wearer, whose muscles keep the measured ankle angle."""
+SEED, ALL = PAPER, "all"
+"""Name of the study of the paper behind this package, and name for all studies together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,10 +94,6 @@ COMPUTATIONS: dict[str, _Computation] = {
     "walking_torque": _Computation("N m", _OF_PRESSURE, walking_torque),
     "dorsiflexor_share": _Computation("1", {}, dorsiflexor_share),
 }
-
-
-SEED, ALL = PAPER, "all"
-"""Name of the study of the paper behind this package, and name for all studies together."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,6 +30,17 @@ from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.plant import gravity_torque
 from ppafo.model.sensors import Measurement
 
+SMOOTHING = 8.0
+"""Filter time constant of the reference acceleration divided by the one of the rate [-]; the reference may jump."""
+SLOW = 0.05
+"""Requested joint rate [rad/s] above which the friction is compensated in full."""
+SHARE_OF_FRICTION = 0.7
+"""Fraction of the assumed kinetic friction that is compensated; overcompensation makes the joint oscillate."""
+CREEP_LAGS = 5.0
+"""Time, in lags of the torque loop, in which the breakaway torque grows by the static friction at ``CREEP_ERROR``."""
+FASTEST_CREEP = 10.0
+"""Largest growth rate of the breakaway torque divided by the nominal rate, at larger errors [-]."""
+
 
 class CascadeParameters(NamedTuple):
     """Gains of the angle loop and of the inner torque loop, and the assumed dynamics of joint and valve.
@@ -115,18 +126,8 @@ class _CascadeState(NamedTuple):
     is_full: float = 0.0
 
 
-SMOOTHING = 8.0
-"""Filter time constant of the reference acceleration divided by the one of the rate [-]; the reference may jump."""
-SLOW = 0.05
-"""Requested joint rate [rad/s] above which the friction is compensated in full."""
-SHARE_OF_FRICTION = 0.7
-"""Fraction of the assumed kinetic friction that is compensated; overcompensation makes the joint oscillate."""
-CREEP_LAGS = 5.0
-"""Time, in lags of the torque loop, in which the breakaway torque grows by the static friction at ``CREEP_ERROR``."""
 CREEP_ERROR = math.radians(1.0)
 """Angle error [rad] at which the breakaway torque grows at its nominal rate."""
-FASTEST_CREEP = 10.0
-"""Largest growth rate of the breakaway torque divided by the nominal rate, at larger errors [-]."""
 
 
 def cascade_update(

@@ -16,6 +16,8 @@ from ppafo.model.sensors import Measurement
 
 SMALLEST_GAIN = 1.0e-3
 """Torque rate at full opening [N m/s] below which the valve opens fully and the result is clipped."""
+NEARLY_SUPPLY = 0.999
+"""Largest fraction of the supply pressure used by the feed-forward; above it no opening meets the request."""
 
 
 def _believed(name: str, unit: str, what: str, minimum: float, maximum: float) -> Quantity:
@@ -112,10 +114,6 @@ def opening_for_rate(rates: TorqueRates, requested: float) -> float:
     gain = rates.rising if needed >= 0.0 else rates.falling
     # Where full opening moves the torque hardly at all, the quotient is limited, not the command's sign.
     return max(-1.0, min(1.0, needed / max(gain, SMALLEST_GAIN)))
-
-
-NEARLY_SUPPLY = 0.999
-"""Largest fraction of the supply pressure used by the feed-forward; above it no opening meets the request."""
 
 
 class _PidFeedforwardParameters(NamedTuple):

@@ -11,6 +11,9 @@ from ppafo.model.controlled import ANYTHING, OF_TORQUE, ErrorFunctions, seen_err
 from ppafo.model.declaration import EmptyRow, Number, quantities_of
 from ppafo.model.sensors import Measurement
 
+ROUNDING = 1.0e-9
+"""Error [N m] below which an error counts as zero, so that rounding does not decide the first command."""
+
 
 class ConstantParameters(NamedTuple):
     """Setting of a constant-command law: the command [-] from -1 to 1."""
@@ -35,10 +38,6 @@ CONSTANT = ControllerKind(
     update=constant_update,
     needs_reference=False,
 )
-
-
-ROUNDING = 1.0e-9
-"""Error [N m] below which an error counts as zero, so that rounding does not decide the first command."""
 
 
 def on_off_update(

@@ -15,6 +15,15 @@ from ppafo.control.walking.phases import PHASE_QUANTITIES, PhaseState
 from ppafo.model.declaration import Quantity
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF
 
+PEAKS = ("peak_torque", "landing_peak_torque", "swing_peak_torque")
+"""Settings that ``largest_torque`` limits."""
+EASING_TIME = 0.1
+"""Time [s] after a landing on the toes in which the law removes a torque in plantarflexion; later the chambers vent."""
+EASED = 0.3
+"""Torque in plantarflexion [N m] above which the law removes it; a limit of the wearer, not of the actuator."""
+LARGEST_PRESS = 0.7
+"""Largest torque in plantarflexion [N m] requested in the swing: about the weight of a foot with its shoe."""
+
 
 class TorqueProfile(NamedTuple):
     """Peak torque [N m], and peak time, rise time and fall time [strides] after the heel strike."""
@@ -83,8 +92,6 @@ ASSISTANCE_QUANTITIES = (
 )
 """Fields of ``Assistance`` in order."""
 
-PEAKS = ("peak_torque", "landing_peak_torque", "swing_peak_torque")
-"""Settings that ``largest_torque`` limits."""
 
 ASSISTING_QUANTITIES = (*ASSISTANCE_QUANTITIES, *PHASE_QUANTITIES)
 """Settings that every law with ``assistance`` declares after those of the law."""
@@ -117,15 +124,6 @@ class TorqueRequest(NamedTuple):
 
 
 START = TorqueRequest()
-
-EASING_TIME = 0.1
-"""Time [s] after a landing on the toes in which the law removes a torque in plantarflexion; later the chambers vent."""
-
-EASED = 0.3
-"""Torque in plantarflexion [N m] above which the law removes it; a limit of the wearer, not of the actuator."""
-
-LARGEST_PRESS = 0.7
-"""Largest torque in plantarflexion [N m] requested in the swing: about the weight of a foot with its shoe."""
 
 
 def requested_torque(rules: Assistance, phase: PhaseState, angle: float, rate: float) -> float:

@@ -11,6 +11,9 @@ from typing import Annotated, NamedTuple
 from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
 
+LONGEST_PHASE = 1.2
+"""Longest duration of a phase in which the device acts [strides]."""
+
 
 class PhaseRules(NamedTuple):
     """Thresholds [N], debounce [s], first stride time [s], weight of a new stride [-], start of push-off [turns]."""
@@ -47,9 +50,6 @@ class PhaseState(NamedTuple):
 
 
 START = PhaseState()
-
-LONGEST_PHASE = 1.2
-"""Longest duration of a phase in which the device acts [strides]."""
 
 
 def lifts(phase: float) -> bool:

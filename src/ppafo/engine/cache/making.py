@@ -32,6 +32,8 @@ LONGEST_WAIT = 300.0
 """Longest wait for a lock [s], after which a process compiles for itself; a dead process holds no lock."""
 # Between two tries to get the lock [s]: short beside the seconds of a compilation.
 _PAUSE = 0.05
+QUIET = 2.0
+"""Duration of a compilation [s] below which no message is shown."""
 
 
 @contextlib.contextmanager
@@ -74,8 +76,6 @@ def _lock(lock_file: Path) -> int | None:
     return None
 
 
-QUIET = 2.0
-"""Duration of a compilation [s] below which no message is shown."""
 _models: ContextVar[int] = ContextVar("models that are compiled together", default=0)
 
 

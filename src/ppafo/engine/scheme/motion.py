@@ -31,6 +31,15 @@ SAFETY = 0.81
 MINIMUM_ERROR = 0.2025
 MAXIMUM_ERROR = 20.25
 """Largest error ratio used in step control; ``MINIMUM_ERROR`` and this value give the length factors 2 and 0.2."""
+ALLOWED_OF_ANGLE = 2.0e-6
+"""Allowed error of one part divided by the angle range [-]; the error of a run then stays below 2e-4 of the range."""
+ALLOWED_BY_GAS = 3.0e-6
+"""Allowed error of one part divided by the angle that would close the smaller chamber [-]."""
+MISSED_FRACTION = 0.2
+"""Fraction [-] of the difference between the assumed angle and the angle after an event that counts as error."""
+SIXTH = 1.0 / 6.0
+LOWEST_REBOUND = 1.0e-7
+"""Height of a rebound divided by the angle range [-] below which the vane stays at the stop."""
 
 
 class StepControl(NamedTuple):
@@ -70,17 +79,6 @@ def next_pace(pace: StepControl, error: float, length: float, refused: bool, lon
     # A part that an event cut short had little error for that reason: the next may be as long as before.
     kept = max(pace.length, wanted) if factor >= 1.0 and not refused else wanted
     return StepControl(max(min(kept, longest), SHORTEST_PART))
-
-
-ALLOWED_OF_ANGLE = 2.0e-6
-"""Allowed error of one part divided by the angle range [-]; the error of a run then stays below 2e-4 of the range."""
-ALLOWED_BY_GAS = 3.0e-6
-"""Allowed error of one part divided by the angle that would close the smaller chamber [-]."""
-MISSED_FRACTION = 0.2
-"""Fraction [-] of the difference between the assumed angle and the angle after an event that counts as error."""
-SIXTH = 1.0 / 6.0
-LOWEST_REBOUND = 1.0e-7
-"""Height of a rebound divided by the angle range [-] below which the vane stays at the stop."""
 
 
 class FrictionTorques(NamedTuple):

@@ -27,6 +27,26 @@ from ppafo.model.plant import (
 )
 from ppafo.model.ports import leakage_path
 
+# gamma = 1 - 1/sqrt(2) makes the method L-stable; SHORTEST keeps a part without length from dividing by 0.
+GAMMA = 0.2928932188134524
+SHORTEST = 1.0e-30
+ALLOWED_OF_PRESSURE = 2.5e-5
+"""Allowed error of one step divided by the reference pressure [-]; a run then stays within ``KEPT_OF_PRESSURE``."""
+KEPT_OF_PRESSURE = 1.0e-3
+"""Error of a pressure divided by the pressure range [-] that a run does not exceed at the default tolerance."""
+MINIMUM_PRESSURE = 0.02
+"""Lowest reference pressure for errors, as a fraction of the atmospheric pressure [-]."""
+OF_STAGES = 0.5 / ALLOWED_OF_PRESSURE
+"""Weight of a step's error: half the sum of both stages, divided by the allowed error [-]."""
+OF_OPENING = 1.0 / (12.0 * GAMMA * ALLOWED_OF_PRESSURE)
+"""Weight of the error due to a moving valve: the mean of a product exceeds that of means by a twelfth of both changes.
+
+The matrix of the step gives gamma times the change of the flow.
+"""
+
+# Found by trying: with fewer steps for a filling the error of a plain step passes 1e-3 (docs/decisions/0002).
+STEPS_PER_FILLING = 70.0
+
 
 class GasFlows(NamedTuple):
     """Flows into both chambers, and leakage flow across the vane from chamber 1 to 2 [kg/s]."""
@@ -64,17 +84,6 @@ def gas_flows(
     in_2, slopes_2 = port_flow(pressure_2, port_2, plant.valve_curve)
     leak, by_1, by_2 = orifice_flow(pressure_1, pressure_2, leaking, 1.0, plant.leak_curve)
     return SlopedFlows(GasFlows(in_1, in_2, leak), slopes_1, slopes_2, by_1, by_2)
-
-
-# gamma = 1 - 1/sqrt(2) makes the method L-stable; SHORTEST keeps a part without length from dividing by 0.
-GAMMA = 0.2928932188134524
-SHORTEST = 1.0e-30
-ALLOWED_OF_PRESSURE = 2.5e-5
-"""Allowed error of one step divided by the reference pressure [-]; a run then stays within ``KEPT_OF_PRESSURE``."""
-KEPT_OF_PRESSURE = 1.0e-3
-"""Error of a pressure divided by the pressure range [-] that a run does not exceed at the default tolerance."""
-MINIMUM_PRESSURE = 0.02
-"""Lowest reference pressure for errors, as a fraction of the atmospheric pressure [-]."""
 
 
 class Flows(NamedTuple):
@@ -277,15 +286,6 @@ def with_gas(state: PlantState, gas: Flows) -> PlantState:
     )
 
 
-OF_STAGES = 0.5 / ALLOWED_OF_PRESSURE
-"""Weight of a step's error: half the sum of both stages, divided by the allowed error [-]."""
-OF_OPENING = 1.0 / (12.0 * GAMMA * ALLOWED_OF_PRESSURE)
-"""Weight of the error due to a moving valve: the mean of a product exceeds that of means by a twelfth of both changes.
-
-The matrix of the step gives gamma times the change of the flow.
-"""
-
-
 def pressure_error(
     plant: PlantParameters,
     weight: float,
@@ -325,10 +325,6 @@ def supply_range(plant: PlantParameters) -> float:
     room = plant.atmospheric_pressure
     supplied = max(abs(plant.supply_pressure - room), abs(plant.dorsiflexion_pressure - room))
     return max(supplied, MINIMUM_PRESSURE * room)
-
-
-# Found by trying: with fewer steps for a filling the error of a plain step passes 1e-3 (docs/decisions/0002).
-STEPS_PER_FILLING = 70.0
 
 
 def filling_time(plant: PlantParameters, volume: float) -> float:

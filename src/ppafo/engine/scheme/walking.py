@@ -11,6 +11,9 @@ from ppafo.model.elementary import TURNS_OF_RADIAN, sine_and_cosine_of_turns
 from ppafo.model.gait import GaitNow
 from ppafo.model.leg import FootLoad, LegParameters, foot_load, passive_torque, torque_of_shank
 
+# Higher than any foot [m]: the lowest clearance before the swing is looked at.
+NO_CLEARANCE = 1.0e3
+
 
 class DeviceShare(NamedTuple):
     """Contribution of foot plate and vane to the leg: inertia [kg m^2], damping [N m s/rad], mass moment [kg m].
@@ -150,7 +153,3 @@ class WalkEnd(NamedTuple):
     angle: float
     rate: float
     departs: float
-
-
-# Higher than any foot [m]: the lowest clearance before the swing is looked at.
-NO_CLEARANCE = 1.0e3

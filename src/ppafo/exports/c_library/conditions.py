@@ -9,6 +9,15 @@ from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
 
+_TIMES = ("run_output_interval", "run_step", "controller_period", "run_duration")
+RULES_OF_TIMES: tuple[Condition, ...] = (
+    ("is_whole(settings->run_duration / settings->run_output_interval)", "run_output_interval"),
+    ("settings->run_duration / settings->run_step <= 1.0e8", "run_duration"),
+    ("settings->run_duration / settings->run_output_interval <= 5.0e6", "run_duration"),
+    ("settings->sensors_delay / settings->run_step <= 1.0e5", "sensors_delay"),
+)
+"""Rules of the times of a scenario (``simulation/clock.py``)."""
+
 
 def conditions_of_program(library: Library) -> list[Condition]:
     """C conditions under which settings require another compiled program, each with the setting to report."""
@@ -22,17 +31,6 @@ def conditions_of_program(library: Library) -> list[Condition]:
         else:
             conditions += [(f"settings->{name} > 0.0", name) for name in names]
     return [*conditions, *library.other_program]
-
-
-_TIMES = ("run_output_interval", "run_step", "controller_period", "run_duration")
-
-RULES_OF_TIMES: tuple[Condition, ...] = (
-    ("is_whole(settings->run_duration / settings->run_output_interval)", "run_output_interval"),
-    ("settings->run_duration / settings->run_step <= 1.0e8", "run_duration"),
-    ("settings->run_duration / settings->run_output_interval <= 5.0e6", "run_duration"),
-    ("settings->sensors_delay / settings->run_step <= 1.0e5", "sensors_delay"),
-)
-"""Rules of the times of a scenario (``simulation/clock.py``)."""
 
 
 def other_supply(device: Device) -> Condition:

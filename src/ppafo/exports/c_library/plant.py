@@ -19,6 +19,21 @@ from ppafo.simulation.scenario import Control, FreeMotion, Motion, PrescribedMot
 from ppafo.walking.declaration import FORCES
 from ppafo.walking.motion import WalkMotion
 
+_WALKING = "command to the valve, clipped to -1 to 2; above 0 feeds chamber 1, above 1.5 vents both"
+STEPS = "run.step"
+"""Path of the setting for the input interval."""
+_AS_STEPS = ("controller_period", "run_output_interval")
+"""Other time settings, which must equal the input interval."""
+_WITHOUT_EFFECT = ("run.duration", "run.output_interval", "controller.command", "controller.period")
+"""Settings without effect on a plant that is stepped from outside."""
+_REPLACED = ("sensors.", "motion.external_torque", "motion.ankle_torque")
+_PATH = "motion.profile."
+"""Prefixes of the paths replaced by inputs: in any plant, and in a plant with an ankle driven by inputs."""
+_FIRST_RAMP = 0.0078125
+"""Duration [s] of the initial ramp of an angle; short, so that a fast ankle stays in the range of a level."""
+EXAMPLE = 0.5
+"""Command [-] of the example, nonzero to have an effect."""
+
 
 @dataclass(frozen=True, slots=True)
 class Input:
@@ -33,7 +48,6 @@ class Input:
 
 
 COMMAND = Input("command", "-", "command to the valve, clipped to -1 to 1; above 0 feeds chamber 1", 0.0, -1.0, 1.0)
-_WALKING = "command to the valve, clipped to -1 to 2; above 0 feeds chamber 1, above 1.5 vents both"
 WALKING_COMMAND = Input("command", "-", _WALKING, VENT, -1.0, VENT)
 
 
@@ -75,17 +89,6 @@ class PlantAlone:
         return (self.drive.command, *self.drive.inputs)
 
 
-STEPS = "run.step"
-"""Path of the setting for the input interval."""
-_AS_STEPS = ("controller_period", "run_output_interval")
-"""Other time settings, which must equal the input interval."""
-_WITHOUT_EFFECT = ("run.duration", "run.output_interval", "controller.command", "controller.period")
-"""Settings without effect on a plant that is stepped from outside."""
-_REPLACED = ("sensors.", "motion.external_torque", "motion.ankle_torque")
-_PATH = "motion.profile."
-"""Prefixes of the paths replaced by inputs: in any plant, and in a plant with an ankle driven by inputs."""
-
-
 def plant_of(scenario: Scenario) -> PlantAlone:
     """Return the plant of a scenario; inputs are a torque for a free joint, angle and rate for a locked joint.
 
@@ -118,10 +121,6 @@ def plant_of(scenario: Scenario) -> PlantAlone:
 def _drive_of(_motion: Motion, _settings: Mapping[str, ExportParameter]) -> _Drive:
     """Return the external drive of a plant with this motion, within the ranges of its settings: here a walk."""
     return _Drive(motion="The leg follows its gait.", command=WALKING_COMMAND)
-
-
-_FIRST_RAMP = 0.0078125
-"""Duration [s] of the initial ramp of an angle; short, so that a fast ankle stays in the range of a level."""
 
 
 @_drive_of.register
@@ -180,10 +179,6 @@ def plant_library(scenario: Scenario) -> dict[str, bytes]:
     """Return the C files of the plant by name; ``NAME_step(run, command, ...)`` advances by one step."""
     library = plant_of(scenario).library
     return {**library_files(library), "expected.csv": expected_csv(half_open(scenario), library.program.outputs)}
-
-
-EXAMPLE = 0.5
-"""Command [-] of the example, nonzero to have an effect."""
 
 
 def half_open(scenario: Scenario) -> Scenario:

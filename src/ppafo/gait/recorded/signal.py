@@ -22,6 +22,21 @@ _ORDER = 2
 """Order of the Butterworth low pass, which is applied twice."""
 _DOUBLE_PASS = (2.0**0.5 - 1.0) ** 0.25
 """Ratio of the -3 dB frequencies of two passes and of a single pass (Winter, Biomechanics, section 2.4)."""
+LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
+"""Curves that are undefined while the foot is off a force plate, which does not count as a gap."""
+_RATE = "rad/s"
+_NOT_INTEGRATED = "; integrate it over each stride, less its mean over the stride, and set the zero while standing"
+_MOST_NAMES, _LONGEST_TEXT = 12, 160
+"""Limits of an error message: number of column names, and characters of the names and of a remark."""
+THIGH_FRACTION = 0.245
+"""Thigh length as a fraction of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement,
+4th ed. 2009."""
+_LENGTHS = (0.2, 0.7)
+"""Plausible lengths of a thigh [m]."""
+_HIP_HEIGHT = 0.3
+"""Depth of the hip below the origin [m] above which the sign is wrong; laboratories have no origin above the hip."""
+_FASTEST_BACK = 0.2
+"""Largest backward speed [m/s] on a treadmill, averaged over the recording."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,14 +99,6 @@ def low_pass(signal: Signal, cut_off: float) -> Signal:
     sections = butter(_ORDER, relative, output="sos")
     values = sosfiltfilt(sections, np.interp(even, signal.time, signal.values))
     return replace(signal, time=even, values=np.asarray(values, dtype=np.float64))
-
-
-LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
-"""Curves that are undefined while the foot is off a force plate, which does not count as a gap."""
-_RATE = "rad/s"
-_NOT_INTEGRATED = "; integrate it over each stride, less its mean over the stride, and set the zero while standing"
-_MOST_NAMES, _LONGEST_TEXT = 12, 160
-"""Limits of an error message: number of column names, and characters of the names and of a remark."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -191,17 +198,6 @@ def missing_column(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTa
     texts = [first_names, *(one_line(remark) for table in tables for remark in table.remarks)]
     listed = "; ".join(shorten(text, _LONGEST_TEXT, placeholder=" ...") for text in texts)
     return f"{'; '.join(reasons)} ({files}: {listed}); a gait map ({setting_text('columns')}) names other columns"
-
-
-THIGH_FRACTION = 0.245
-"""Thigh length as a fraction of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement,
-4th ed. 2009."""
-_LENGTHS = (0.2, 0.7)
-"""Plausible lengths of a thigh [m]."""
-_HIP_HEIGHT = 0.3
-"""Depth of the hip below the origin [m] above which the sign is wrong; laboratories have no origin above the hip."""
-_FASTEST_BACK = 0.2
-"""Largest backward speed [m/s] on a treadmill, averaged over the recording."""
 
 
 def knee_signals(

@@ -102,6 +102,10 @@ _POSITIVE = ("ankle_in_front", "plantarflexion", "up", "forward")
 
 MappedCurve = ShankMap | AngleMap | MomentMap | ForceMap | PressureMap
 """Entry of a gait map for a single curve; the knee, with two curves, is separate."""
+_SAME = 0.02
+"""Relative difference up to which two statements of the body mass count as equal."""
+_UNIT_BODY_MASS = 1.0
+"""Body mass [kg] that divides the loads of a person of unknown body mass."""
 
 
 def walk_signals(
@@ -325,12 +329,6 @@ def _completed_map(own: GaitMap | None, tables: Sequence[MotionTable], side: Sid
 def _is_there(mapped: object, table: MotionTable) -> bool:
     """Return True if a table has all columns of a mapped curve."""
     return mapped is not None and all(name.removeprefix("-") in table.columns for name in column_names(mapped))
-
-
-_SAME = 0.02
-"""Relative difference up to which two statements of the body mass count as equal."""
-_UNIT_BODY_MASS = 1.0
-"""Body mass [kg] that divides the loads of a person of unknown body mass."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,6 +18,18 @@ STRIKE, OFF = "foot strike", "foot off"
 AXES = "xyz"
 COORDINATES = (".x", ".y", ".z")
 """Suffixes of the columns of a marker's coordinates, ``LABEL.x``."""
+_TURNS = 3
+"""Number of repetitions of a mean stride: one whole stride lies within, wherever its table begins."""
+_ENDS_OF_STRIDE = 5.0
+"""Largest distance of the first and the last row of a mean stride to 0 and 100 % [%]."""
+_LARGEST_JUMP = 3.0
+"""Sampling interval, relative to the median interval, above which it counts as a gap [-]."""
+MOST_ACCELERATION = 50.0
+"""Acceleration [m/s^2] that a marker on a leg does not reach when it starts to move from rest."""
+_COARSE = 5.0e-5
+"""Least difference of coordinates [m] from which rounding may repeat the position of a marker at rest."""
+LONGEST_FILLED = 0.25
+"""Longest gap [s] that may be filled; beyond a quarter of a stride, interpolation is not possible."""
 
 
 def bare_label(label: str) -> str:
@@ -58,12 +70,6 @@ class MotionTable:
     events: Events | None = None
 
 
-_TURNS = 3
-"""Number of repetitions of a mean stride: one whole stride lies within, wherever its table begins."""
-_ENDS_OF_STRIDE = 5.0
-"""Largest distance of the first and the last row of a mean stride to 0 and 100 % [%]."""
-
-
 def mean_stride_table(table: MotionTable, stride_time: float) -> MotionTable:
     """Return a mean stride over percent, in its first column, over time, repeated; unchanged without such a column."""
     percent = next(iter(table.columns.values()))
@@ -97,10 +103,6 @@ def counted_table(table: MotionTable, rate: float) -> MotionTable:
         with refused_as(DataError, table.file, DataError):
             check_clock(time, range(1, time.size + 1), "row")
     return replace(table, time=time, problem="")
-
-
-_LARGEST_JUMP = 3.0
-"""Sampling interval, relative to the median interval, above which it counts as a gap [-]."""
 
 
 def cut_table(
@@ -140,12 +142,6 @@ def cut_table(
         )
     columns = {name: values[inside] for name, values in table.columns.items()}
     return replace(table, time=table.time[inside], columns=columns)
-
-
-MOST_ACCELERATION = 50.0
-"""Acceleration [m/s^2] that a marker on a leg does not reach when it starts to move from rest."""
-_COARSE = 5.0e-5
-"""Least difference of coordinates [m] from which rounding may repeat the position of a marker at rest."""
 
 
 def metres_in(table: MotionTable, column: str) -> float:
@@ -209,10 +205,6 @@ def _resolution(at: Floats) -> float:
     """Return the smallest step between frames of the coordinates of a marker [m]; 0 if it never moves."""
     steps = np.abs(np.diff(at, axis=1))
     return float(np.min(steps, initial=np.inf, where=steps > 0.0)) if steps.any() else 0.0
-
-
-LONGEST_FILLED = 0.25
-"""Longest gap [s] that may be filled; beyond a quarter of a stride, interpolation is not possible."""
 
 
 def fill_gaps(table: MotionTable, names: Iterable[str], longest: float) -> MotionTable:

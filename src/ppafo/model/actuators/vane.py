@@ -10,6 +10,9 @@ from ppafo.model.actuators.kind import ActuatorKind, ActuatorModel, Chambers, Ra
 from ppafo.model.declaration import Number
 from ppafo.model.plant import PlantParameters, chamber_pressures, chamber_volumes, joint_torque
 
+SMALLEST_VOLUME = 1e-18
+"""Smallest volume [m^3], a cube of a micrometre: a smaller value is a typing error, and dividing by it may overflow."""
+
 
 def chambers(plant: PlantParameters, angle: float, pressure_1: float, pressure_2: float) -> Chambers:
     """Both chambers, which are rigid. Equations (4), (5)."""
@@ -22,8 +25,6 @@ def prepare(_settings: Any, _stops: Range) -> None:
 
 
 MODEL = ActuatorModel(None, prepare, chambers, chamber_pressures, joint_torque, gives=False, has_torque_constant=True)
-SMALLEST_VOLUME = 1e-18
-"""Smallest volume [m^3], a cube of a micrometre: a smaller value is a typing error, and dividing by it may overflow."""
 
 
 class VaneSettings(NamedTuple):

@@ -12,6 +12,14 @@ from ppafo.model.declaration import Quantity, quantities_of
 from ppafo.model.orifice import FlowCurve
 from ppafo.model.plant import Openings, PlantParameters, PortFlow, PortSlopes
 
+# Beyond full opening, so that one number says both, and no rounding of -1 to 1 comes near it.
+VENT = 2.0
+"""Command that vents both chambers: solenoids off; a proportional valve needs a vent valve for this command."""
+
+# Half-way between full opening and VENT: either may pass through sums of floats.
+VENTS_ABOVE = 1.5
+"""Commands above this value vent."""
+
 
 @dataclass(frozen=True, slots=True)
 class ValveModel:
@@ -115,12 +123,3 @@ class ValveKind:
 def never(valve: Any, state: Any, command: float, time: float) -> float:
     """Time [s] of the next event of a valve that changes with its command only: never between two commands."""
     return math.inf
-
-
-# Beyond full opening, so that one number says both, and no rounding of -1 to 1 comes near it.
-VENT = 2.0
-"""Command that vents both chambers: solenoids off; a proportional valve needs a vent valve for this command."""
-
-# Half-way between full opening and VENT: either may pass through sums of floats.
-VENTS_ABOVE = 1.5
-"""Commands above this value vent."""

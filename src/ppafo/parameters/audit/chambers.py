@@ -16,6 +16,19 @@ _SUPPLY = "supply.pressure"
 _ID = "virtual-work"
 # Below 10 % two reported numbers of two digits rarely differ for certain.
 _TOLERANCE = 0.1
+_SLOPE = "actuator.displacement_per_radian"
+_STOPS = ("actuator.angle_min", "actuator.angle_max")
+_DEAD = ("actuator.dead_volume_1", "actuator.dead_volume_2")
+_RATED = "reported.rated_rotation"
+
+# 1 % of room for rounding of reported angles.
+_SAME_TURN = 1.01
+_LEVER = ("actuator.lever_length", "actuator.base_distance", "actuator.lever_offset")
+_VOLUME = ("actuator.displacement_per_radian", "actuator.dead_volume_1")
+_LEAST, _MOST = 0.6, 1.1
+"""Accepted ratio of the gas of one filling to the measured gas use [-]; the remainder leaks during the task."""
+_FELT_TORQUE = 0.01
+"""Standard deviation of the torque, relative to the largest one [-], from which a rounded table is a warning."""
 
 
 def check_virtual_work(evidence: Evidence) -> Iterator[AuditFinding]:
@@ -78,10 +91,6 @@ def _gas_use(
 
 # Are both chamber volumes positive over the angles in use? Equations (4) and (5).
 
-_SLOPE = "actuator.displacement_per_radian"
-_STOPS = ("actuator.angle_min", "actuator.angle_max")
-_DEAD = ("actuator.dead_volume_1", "actuator.dead_volume_2")
-
 
 def check_volumes(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield an error for each chamber whose volume is not positive at one end of the angle range."""
@@ -119,10 +128,6 @@ def _chamber(evidence: Evidence, chamber: int, travel: float, turn: float, end_p
 
 # Does the actuator turn as far as it is used?
 
-_RATED = "reported.rated_rotation"
-# 1 % of room for rounding of reported angles.
-_SAME_TURN = 1.01
-
 
 def check_rotation(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield a warning for a range of angles larger than the actuator's designation."""
@@ -144,8 +149,6 @@ def check_rotation(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 # Which stroke of a cylinder and which lever arms do the stops need?
-
-_LEVER = ("actuator.lever_length", "actuator.base_distance", "actuator.lever_offset")
 
 
 def check_stroke(evidence: Evidence) -> Iterator[AuditFinding]:
@@ -170,10 +173,6 @@ def check_stroke(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 # Is the gas of one filling that was measured the gas that chamber 1 holds? Equations (3) and (4).
-
-_VOLUME = ("actuator.displacement_per_radian", "actuator.dead_volume_1")
-_LEAST, _MOST = 0.6, 1.1
-"""Accepted ratio of the gas of one filling to the measured gas use [-]; the remainder leaks during the task."""
 
 
 def check_filling(evidence: Evidence) -> Iterator[AuditFinding]:
@@ -206,9 +205,6 @@ def check_filling(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 # Torque that the rounding of a measured table leaves unknown.
-
-_FELT_TORQUE = 0.01
-"""Standard deviation of the torque, relative to the largest one [-], from which a rounded table is a warning."""
 
 
 def check_rounded_table(evidence: Evidence) -> Iterator[AuditFinding]:

@@ -21,6 +21,9 @@ from ppafo.units.shown import shown_in, shown_unit, shown_value
 from ppafo.units.spelling import DECIMALS
 
 Severity = Literal["error", "warning", "note"]
+GAS_PATHS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
+_SMALLEST, _LARGEST = 1e-20, 1e20
+"""Limits of plausible SI magnitudes; products of larger numbers would overflow."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,12 +79,6 @@ class AuditFinding:
         for side in plain["sides"]:
             side["value"] = side["value"] if math.isfinite(side["value"]) else None
         return plain
-
-
-GAS_PATHS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
-
-_SMALLEST, _LARGEST = 1e-20, 1e20
-"""Limits of plausible SI magnitudes; products of larger numbers would overflow."""
 
 
 class ReportedRange(NamedTuple):

@@ -33,6 +33,14 @@ _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
 }
+_SWITCHING = ("closing_delay", "switching_interval")
+_TOLERANCE = 0.02
+_TABULATED_TEMPERATURE = 298.0
+
+# The coefficient of CO2 changes by about 15 % over 20 K: the estimate stays one.
+_TEMPERATURE_ROOM = 20.0
+_WORTH_A_WARNING = 0.05
+_SUPPLY = "supply.pressure"
 
 
 def check_choked_flow(evidence: Evidence) -> Iterator[AuditFinding]:
@@ -160,8 +168,6 @@ def _stated_numbers(name: str) -> dict[str, tuple[float, str]]:
 
 
 # Does a device lack a value, or count as ideal without one?
-
-_SWITCHING = ("closing_delay", "switching_interval")
 
 
 def check_missing(evidence: Evidence) -> Iterator[AuditFinding]:
@@ -296,8 +302,6 @@ def check_ranges(evidence: Evidence) -> Iterator[AuditFinding]:
 
 # Do molar mass and heat capacity ratio belong to the gas that the set names?
 
-_TOLERANCE = 0.02
-
 
 def check_gas_data(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield an error for each gas constant that deviates more than 2 % from the named gas."""
@@ -328,12 +332,6 @@ def check_gas_data(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 # How large is the error of the ideal gas law at supply pressure? Equation (3).
-
-_TABULATED_TEMPERATURE = 298.0
-# The coefficient of CO2 changes by about 15 % over 20 K: the estimate stays one.
-_TEMPERATURE_ROOM = 20.0
-_WORTH_A_WARNING = 0.05
-_SUPPLY = "supply.pressure"
 
 
 def check_ideal_gas(evidence: Evidence) -> Iterator[AuditFinding]:

@@ -69,6 +69,8 @@ REGULATOR = (
         minimum_allowed=False,
     ),
 )
+_OPTIONAL = "hose"
+"""Optional section of a bottle file."""
 
 
 def _passage(component: str, short_name: str) -> tuple[Quantity, ...]:
@@ -102,8 +104,6 @@ SECTIONS: dict[str, tuple[Quantity, ...]] = {
     "hose": HOSE,
     "room": ROOM,
 }
-_OPTIONAL = "hose"
-"""Optional section of a bottle file."""
 
 PATHS: dict[str, Quantity] = {
     f"{section}.{quantity.name}": quantity for section, members in SECTIONS.items() for quantity in members

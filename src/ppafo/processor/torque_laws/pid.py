@@ -55,6 +55,8 @@ LARGEST_INTEGRAL = 32 * FULL * FINE
 """Largest integral in integral units, below 2^30."""
 SHARE = float(2**FRACTION_BITS)
 """Integer that represents a fraction of 1."""
+_LARGEST_ERROR = 2 * LARGEST_READING
+"""Largest error [counts]: reference and pressure difference each span one range."""
 
 
 class _PidNumbers(NamedTuple):
@@ -173,8 +175,6 @@ _PID_NUMBERS = (
     Quantity("anti_windup", "", "share of the excess that is pulled back, in 1/2^15", None, 0.0, _MOST_OF_FRACTION),
     Quantity("dead_band", "", "dead band of the valve, in 1/2^15", None, 0.0, _MOST_OF_FRACTION),
 )
-_LARGEST_ERROR = 2 * LARGEST_READING
-"""Largest error [counts]: reference and pressure difference each span one range."""
 PID = fixed_law(
     FLOAT_PID,
     _PidRows,

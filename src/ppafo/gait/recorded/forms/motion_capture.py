@@ -31,6 +31,8 @@ _TRC, _TRC_ROWS = "PathFileType", 5
 _NUMBER = re.compile(r"[+-]?\.?\d|nan", re.IGNORECASE)
 """Pattern of the start of a numeric cell."""
 _DFLOW_COLUMN = re.compile(r"(.+)\.(Pos|Cop|For|Mom)([XYZ])")
+_SHARED = (".csv", ".txt", ".tsv")
+"""File suffixes of several formats."""
 
 
 def _head_of(line: str) -> str:
@@ -254,10 +256,6 @@ def read_trc(path: str | Path) -> MotionTable:
     rows = lines[_TRC_ROWS:]
     block = NumberBlock(lines, _TRC_ROWS, "\t" if any("\t" in line for line in rows) else None)
     return table_of(path, block, names, ["", "s", *[unit] * (len(names) - 2)], "time", noun="markers")
-
-
-_SHARED = (".csv", ".txt", ".tsv")
-"""File suffixes of several formats."""
 
 
 def _form(

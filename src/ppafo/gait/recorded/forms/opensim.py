@@ -32,6 +32,9 @@ _SENTENCE = re.compile(r"angles are in (degrees|radians)", re.IGNORECASE)
 _ANGLES = {"yes": "deg", "degrees": "deg", "no": "rad", "radians": "rad"}
 _MOST_DIGITS = 11
 """Largest number of digits in a header count."""
+_KNEE = "knee_angle_"
+_TURN = 45.0
+"""Rotation of the pelvis [deg] above which a walk is not straight; a straight walk has 5 to 30 deg."""
 
 
 def _is_table(path: str | Path) -> bool:
@@ -162,7 +165,6 @@ def unit_of_label(path: str, label: str, angle: str) -> str:
 
 _WORD = re.compile(r"[a-z]+|\d+")
 _SIDES = {"right": {"r", "right"}, "left": {"l", "left"}}
-_KNEE = "knee_angle_"
 
 
 def opensim_convention(table: MotionTable, side: Side, _body_mass: float) -> Convention:
@@ -202,8 +204,6 @@ def opensim_convention(table: MotionTable, side: Side, _body_mass: float) -> Con
     return Convention(replace(usual, vertical_force=None), tuple(numbered))
 
 
-_TURN = 45.0
-"""Rotation of the pelvis [deg] above which a walk is not straight; a straight walk has 5 to 30 deg."""
 _ALONG = np.radians(5.0)
 """Mean rotation of the pelvis [rad] up to which a walk counts as parallel to x."""
 
