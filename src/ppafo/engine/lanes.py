@@ -337,6 +337,11 @@ class LaneBlock:
         """Change some parameters of all runs from the next step on; ``rows`` as in ``Program.parameter_rows``."""
         self._parameters[rows] = values[:, None]
 
+    def set_earlier(self, commands: Floats) -> None:
+        """Set the commands of the steps (steps,) before the first step; the first of them has always stood."""
+        count = len(self._commands) - 1
+        self._commands[1:] = np.pad(commands, (count, 0), "edge")[-count:, None]
+
     def late_signals(self, step: int) -> Floats:
         """Angle [rad] and pressures [Pa] (3, runs) of delayed sensors at ``step``, the next step, except the first."""
         return self._signals[:, (step - self._clock.signal_delay) % self._signals.shape[1]]

@@ -69,9 +69,9 @@ def replay_together(requests: Sequence[Replay]) -> list[Replayed | PpafoError]:
         except PpafoError as error:
             ended[number] = error
             continue
-        command = None if inputs.command is None else inputs.command.tobytes()
+        commands = [None if values is None else values.tobytes() for values in (inputs.command, inputs.earlier)]
         parameters = tuple((path, series.tobytes()) for path, series in inputs.parameters.items())
-        alike.setdefault((batch.program, batch.clock, command, parameters), []).append(number)
+        alike.setdefault((batch.program, batch.clock, *commands, parameters), []).append(number)
     for together in alike.values():
         first = planned[together[0]]
         batch = replace(

@@ -280,12 +280,15 @@ def test_another_actuator_is_replayed_with_its_own_pressures_and_torque(agree: A
     assert not agree(recording, dataclasses.replace(scenario.device, friction=friction)).passes
 
 
-def test_a_recording_that_begins_in_motion_is_replayed_from_the_velocity_of_its_angles(
-    step: Step, agree: Agree
+@pytest.mark.parametrize(
+    "valve", [(), ("valve.delay=6.3 ms",), ("valve.spool_frequency=15 Hz", "valve.slew_limit=20 1/s")]
+)
+def test_a_recording_that_begins_in_motion_has_velocity_and_valve_of_its_start(
+    valve: tuple[str, ...], agree: Agree
 ) -> None:
-    device, recording = step
-    speed = np.gradient(recording["angle"], recording.time)
-    begin = float(recording.time[int(np.argmax(speed > 0.5 * speed.max()))])
+    scenario = load_scenario("step-response", ["motion.kind=free", *valve])
+    recording = simulate(scenario).recording
+    begin = float(recording.time[int(np.argmax(np.gradient(recording["angle"], recording.time) > 2.0))])
     cut = only(recording.between(begin, 0.5), "command", "angle", "pressure_1", "pressure_2")
     assert cut["command"][0] != 0.0
-    assert max(shares(agree(cut, device)).values()) < 5e-3
+    assert max(shares(agree(cut, scenario.device)).values()) < 5e-3

@@ -34,7 +34,7 @@ from ppafo.simulation.recorded.channels import (
     sample_period,
 )
 from ppafo.simulation.recorded.inputs import between_stops, supply_paths, with_highest_supply
-from ppafo.simulation.recorded.motion import motion_of, read_error
+from ppafo.simulation.recorded.motion import motion_at, read_error
 from ppafo.simulation.recorded.rest import value_at_rest
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.simulation.scenario import (
@@ -197,7 +197,7 @@ def scenario_of(experiment: FittedExperiment) -> Scenario:
         angle = np.interp([experiment.start], recording.time, recording[ANGLE])
         scenario = replace(scenario, motion=FreeMotion(float(between_stops(angle, scenario.device, where)[0])))
     if experiment.initial_state == "scenario":
-        return _moving(experiment, scenario)
+        return scenario
     before = recording.time <= experiment.start + _FITS
     if not before.any():
         raise IdentificationError(
@@ -209,19 +209,10 @@ def scenario_of(experiment: FittedExperiment) -> Scenario:
     recorded = {name: rest[name] for name in ("pressure_1", "pressure_2") if name in rest}
     scenario = replace(scenario, initial=replace(scenario.initial, **recorded))
     if ANGLE in rest and ANGLE not in experiment.inputs and isinstance(scenario.motion, FreeMotion):
-        start = float(between_stops(np.array([rest[ANGLE]]), scenario.device, where)[0])
-        scenario = replace(scenario, motion=replace(scenario.motion, angle=start))
-    return _moving(experiment, scenario)
-
-
-def _moving(experiment: FittedExperiment, scenario: Scenario) -> Scenario:
-    """Return the scenario with the angular velocity at the start, if it begins in motion."""
-    if not isinstance(scenario.motion, FreeMotion) or (start := motion_at_start(experiment)) is None:
-        return scenario
-    angle, velocity, _ = start
-    where = f"experiment '{experiment.label}'"
-    angle = float(between_stops(np.array([angle]), scenario.device, where)[0])
-    return replace(scenario, motion=replace(scenario.motion, angle=angle, angular_velocity=velocity))
+        first, velocity, _ = motion_at_start(experiment) or (rest[ANGLE], scenario.motion.angular_velocity, 0.0)
+        start = float(between_stops(np.array([first]), scenario.device, where)[0])
+        scenario = replace(scenario, motion=replace(scenario.motion, angle=start, angular_velocity=velocity))
+    return scenario
 
 
 def motion_at_start(experiment: FittedExperiment) -> tuple[float, float, float] | None:
@@ -229,13 +220,10 @@ def motion_at_start(experiment: FittedExperiment) -> tuple[float, float, float] 
 
     A recorded velocity says more.
     """
-    recording = experiment.recording
-    names = recording.names
-    if not experiment.is_read or ANGLE in experiment.inputs or ANGLE not in names or "angular_velocity" in names:
+    is_recorded = "angular_velocity" in experiment.recording
+    if not experiment.is_read or ANGLE in experiment.inputs or is_recorded:
         return None
-    inside = recording.time >= experiment.start - _FITS
-    time, angles = recording.time[inside] - experiment.start, recording[ANGLE][inside]
-    return motion_of(time, angles, read_error(recording, ANGLE))
+    return motion_at(experiment.recording, experiment.start)
 
 
 def use_of(experiment: FittedExperiment) -> UsedRecording:

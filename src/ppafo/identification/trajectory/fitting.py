@@ -340,7 +340,7 @@ def _with_inputs(prepared: PreparedExperiment, columns: Mapping[str, Floats], co
             "plant.dorsiflexion_pressure": zero_of.get(DORSIFLEXION_SUPPLY, both),
         }
         corrected = {path: values - offsets.get(path, 0.0) for path, values in prepared.inputs.parameters.items()}
-        inputs = StepInputs(prepared.inputs.command, corrected)
+        inputs = replace(prepared.inputs, parameters=corrected)
         of_group = {path: column[members] for path, column in others.items()}
         for name, values in _run_signals(replace(prepared, inputs=inputs), of_group, len(members)).items():
             signals.setdefault(name, np.empty((len(values), count)))[:, members] = values

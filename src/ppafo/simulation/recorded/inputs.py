@@ -19,7 +19,10 @@ from ppafo.simulation.recorded.channels import (
     LONGEST_STEP,
     SUPPLY,
 )
+from ppafo.simulation.recorded.motion import motion_at
 
+_HISTORY = 0.25
+"""Time before the start for which a valve follows the recorded commands [s], longer than any dead time."""
 _BEYOND_STOPS = 0.05
 """Largest excess of a measured angle over a stop, as a fraction of the range; it is then limited to the stop."""
 _SUPPLY_PATH, _DORSIFLEXION_PATH = "plant.supply_pressure", "plant.dorsiflexion_pressure"
@@ -56,6 +59,7 @@ def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
     stops.
     """
     command = _values_at_steps(inputs, COMMAND, run) if COMMAND in inputs.names else None
+    earlier = None if command is None else _earlier_commands(inputs, run)
     # The parameters that follow a recording [SI], for every step.
     followed: dict[str, Floats] = {}
     # Later ones prevail: a regulator with a recording of its own does not follow the supply.
@@ -76,20 +80,34 @@ def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
         # By the middle of a step: rounding may put a sample a little behind the step that begins with it.
         segment = np.maximum(np.searchsorted(time, begins + 0.5 * run.step, side="right") - 1, 0)
         followed |= {"path.start": time[segment], "path.level": angles[segment], "path.rate": rates[segment]}
-    return StepInputs(command, followed)
+    return StepInputs(command, followed, earlier)
 
 
-def _values_at_steps(inputs: RecordedInputs, name: str, run: Run) -> Floats:
-    """Return an input [SI] at each step (steps,), interpolated as its recording declares.
+def _earlier_commands(inputs: RecordedInputs, run: Run) -> Floats:
+    """Return the commands of the steps before the start; the first of them has always stood.
+
+    A recording that begins in motion under a command begins after it, and one at rest begins with it.
+    """
+    begin = float(inputs.recording.time[0])
+    count = int(min(inputs.start - begin, _HISTORY) / run.step)
+    earlier = _values_at_steps(inputs, COMMAND, run, -count)[:count]
+    first = inputs.recording[COMMAND][:1]
+    # The vane cannot have been set in motion at once; a pressure may.
+    has_stood = first.any() and motion_at(inputs.recording, begin) is not None
+    return np.concatenate([first if has_stood else [0.0], earlier])
+
+
+def _values_at_steps(inputs: RecordedInputs, name: str, run: Run, first_step: int = 0) -> Floats:
+    """Return an input [SI] at each step (steps,) from one on, interpolated as its recording declares.
 
     A step change of a zero-order-hold channel moves to the nearest step. A linear channel is averaged over a step or,
     for fewer changes, over a millisecond; a command is averaged over a step, because a valve responds within less.
     """
     if inputs.recording.is_held(name):
-        middle = run.step * np.arange(run.step_count, dtype=np.float64) + 0.5 * run.step
+        middle = run.step * np.arange(first_step, run.step_count, dtype=np.float64) + 0.5 * run.step
     else:
         together = 1 if name == COMMAND else max(1, min(run.steps_per_sample, round(LONGEST_STEP / run.step)))
-        first = (np.arange(run.step_count) // together * together).astype(np.float64)
+        first = (np.arange(first_step, run.step_count) // together * together).astype(np.float64)
         middle = run.step * (first + 0.5 * together)
     return between_samples(inputs.recording, name, middle, inputs.start)
 

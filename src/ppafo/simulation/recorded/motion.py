@@ -6,8 +6,10 @@ import numpy as np
 
 from ppafo.signals import Recording
 from ppafo.signals.faults import noise_of, resolution_of
-from ppafo.signals.recording import Floats
+from ppafo.simulation.recorded.channels import ANGLE
 
+_FITS = 1.0e-6
+"""Rounding tolerance of the time of a start [s]."""
 _WINDOWS = 8, 12, 16, 24, 32, 48, 64
 """Numbers of first samples from which the velocity of a start in motion is found."""
 _FOLLOWED, _SURE, _SEEN, _LEAST_VELOCITY = 1.3, 2.0, 4.0, 0.05
@@ -15,11 +17,15 @@ _FOLLOWED, _SURE, _SEEN, _LEAST_VELOCITY = 1.3, 2.0, 4.0, 0.05
 of the model, and least velocity of a motion: in such errors [-], and beyond them [rad/s]."""
 
 
-def motion_of(time: Floats, angles: Floats, noise: float) -> tuple[float, float, float] | None:
-    """Return angle [rad], angular velocity and its standard error [rad/s] at time 0 [s], the first; None at rest.
+def motion_at(recording: Recording, start: float) -> tuple[float, float, float] | None:
+    """Return angle [rad], angular velocity and its standard error [rad/s] at a time [s]; None at rest or without angle.
 
-    They are those of a cubic through the first samples, as many as it follows to their noise [rad].
+    They are those of a cubic through the samples from there on, as many as it follows to their noise.
     """
+    if ANGLE not in recording:
+        return None
+    inside = recording.time >= start - _FITS
+    time, angles, noise = recording.time[inside] - start, recording[ANGLE][inside], read_error(recording, ANGLE)
     found = None
     for count in (count for count in _WINDOWS if count <= time.size):
         coefficients, covariance = np.polyfit(time[:count], angles[:count], 3, cov="unscaled")

@@ -12,7 +12,7 @@ from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.channels import ANGLE, COMMAND
 from ppafo.simulation.recorded.inputs import between_stops
-from ppafo.simulation.recorded.motion import motion_of, read_error
+from ppafo.simulation.recorded.motion import motion_at
 
 REST_WINDOW = 0.05
 """Time before the first command over which the start is averaged [s]; so short that a leak has no effect."""
@@ -56,12 +56,10 @@ def start_of(recording: Recording, device: Device, known: Mapping[str, float], f
 
     The first angles tell a velocity that is not recorded. Raises DataError, with ``file``, for a missing channel.
     """
-    error = 0.0
-    if ANGLE in recording and ANGLE not in known and "angular_velocity" not in recording:
-        time = recording.time - recording.time[0]
-        if (motion := motion_of(time, recording[ANGLE], read_error(recording, ANGLE))) is not None:
-            angle, velocity, error = motion
-            known = {ANGLE: angle, "angular_velocity": velocity, **known}
+    is_told = ANGLE in known or "angular_velocity" in recording
+    motion = None if is_told else motion_at(recording, float(recording.time[0]))
+    if motion is not None:
+        known = {ANGLE: motion[0], "angular_velocity": motion[1], **known}
     count, values = samples_at_rest(recording), dict(known)
     if device.actuator.has_one_chamber and "pressure_2" not in recording:
         # No recorded channel depends on the dead volume behind the other port.
@@ -72,7 +70,7 @@ def start_of(recording: Recording, device: Device, known: Mapping[str, float], f
         elif name != "angular_velocity" and name not in values:
             raise DataError(f"{file}: there is no channel '{name}' for the initial state")
     angle = float(between_stops(np.array([values[ANGLE]]), device, file)[0])
-    velocity = values.get("angular_velocity", 0.0)
+    velocity, error = values.get("angular_velocity", 0.0), 0.0 if motion is None else motion[2]
     return ReplayStart(angle, velocity, values["pressure_1"], values["pressure_2"], error)
 
 

@@ -35,9 +35,10 @@ def with_input(experiment: FittedExperiment, name: str, values: np.ndarray, unit
 
 @pytest.fixture(scope="module")
 def controlled() -> tuple[Scenario, Recording]:
-    """A free vane under PID control: the command changes at every sample."""
+    """A free vane under PID control with a slow valve: the command changes at every sample."""
+    valve = ["valve.delay=4.4 ms", "valve.spool_frequency=20 Hz", "valve.slew_limit=30 1/s"]
     scenario = load_scenario(
-        "torque-task-proportional", ["motion.kind=free", "motion.angle=60 deg", "run.duration=0.3 s"]
+        "torque-task-proportional", ["motion.kind=free", "motion.angle=60 deg", "run.duration=0.3 s", *valve]
     )
     return scenario, simulate(scenario).recording
 
@@ -49,14 +50,23 @@ def late(experiment: FittedExperiment) -> FittedExperiment:
     return dataclasses.replace(experiment, recording=recording)
 
 
-def test_a_recorded_command_gives_the_run_that_the_controller_made(controlled: tuple[Scenario, Recording]) -> None:
+@pytest.mark.parametrize("at", [0, 9, 100])
+def test_a_recorded_command_gives_the_run_that_the_controller_made(
+    controlled: tuple[Scenario, Recording], at: int
+) -> None:
     scenario, recording = controlled
     assert np.count_nonzero(np.diff(recording["command"])) > 100
-    followed = FittedExperiment("task", scenario, recording, noise=NOISE, inputs=("command",))
+    # Later than the recording a run starts with the valve where the earlier commands have left it.
+    motion = {name: float(recording[name][at]) for name in ("angle", "angular_velocity")}
+    pressures = {name: float(recording[name][at]) for name in ("pressure_1", "pressure_2")}
+    state = dataclasses.replace(scenario.motion, **motion), dataclasses.replace(scenario.initial, **pressures)
+    begun = dataclasses.replace(scenario, motion=state[0], initial=state[1])
+    start = float(recording.time[at])
+    followed = FittedExperiment("task", begun, recording, start=start, noise=NOISE, inputs=("command",))
     numbers = numbers_of(TrajectoryProblem((FitNumber("valve.discharge_coefficient"),), (followed,)))
     (signals,) = signals_of([prepare(followed, {})], numbers, np.array([[numbers[0].start]]))
-    assert signals["angle"][:, 0] == pytest.approx(recording["angle"], abs=1e-5)
-    assert signals["pressure_1"][:, 0] == pytest.approx(recording["pressure_1"], rel=1e-5)
+    assert signals["angle"][:, 0] == pytest.approx(recording["angle"][at:], abs=1e-5)
+    assert signals["pressure_1"][:, 0] == pytest.approx(recording["pressure_1"][at:], rel=1e-5)
 
 
 def test_forty_runs_follow_the_same_command_as_one(controlled: tuple[Scenario, Recording]) -> None:
