@@ -39,6 +39,7 @@ LABEL = r"^(?=.{1,100}$)[^\x00-\x20\x7f-\xa0](?:[^\x00-\x1f\x7f-\x9f]*[^\x00-\x2
 """Pattern of a display name."""
 RULES = {
     NAME: NAME_RULE,
+    ANY_KEY: "must be a text",
     FILLED: "must not be empty",
     SHORT_NAME: f"{NAME_RULE}, at most 100",
     FREE_KEY: "must consist of letters, digits, '-' and '_'",
@@ -256,7 +257,7 @@ class FieldLayout:
         elif isinstance(field, Many) and field.holds(value):
             for name, item in value.items() if field.keys else enumerate(value, 1):
                 at, of = f"{path}.{one_line(name)}", field.of
-                if field.keys and not re.fullmatch(field.keys, str(name)):
+                if field.keys and not (isinstance(name, str) and re.fullmatch(field.keys, name)):
                     yield at, f"{path}: the name {quote(name)} {RULES[field.keys]}"
                     continue
                 own = {at: of} if isinstance(of, Field) else inside(at, of(item if isinstance(item, Mapping) else {}))

@@ -329,13 +329,15 @@ def entry_in_si(entry: Entry, quantity: Quantity, atmosphere: float) -> float:
 
 def in_first_unit(quantity: Quantity, convert: Callable[[str], float]) -> float:
     """Convert to the first SI unit of a quantity that ``convert`` accepts. Raises UnitError for a wrong dimension."""
-    refused: UnitError | None = None  # the first refusal: it names the unit that the declaration prefers
-    for unit in alternatives(quantity):
-        try:
-            return convert(unit)
-        except UnitError as error:
-            refused = refused or error
-    raise refused or UnitError(f"'{quantity.name}' has no unit")
+    preferred, *others = alternatives(quantity)
+    try:
+        return convert(preferred)
+    except UnitError:
+        for unit in others:
+            with contextlib.suppress(UnitError):
+                return convert(unit)
+        # The first refusal names the unit that the declaration prefers.
+        raise
 
 
 def allowed_number(written: str, entry: Any, quantity: Quantity, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
