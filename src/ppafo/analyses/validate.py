@@ -264,7 +264,7 @@ def _why(causes: Diagnosis, without: float, passes: bool) -> str:
     """Return the cause of a residual in words, or the nearest cause; empty if none was searched.
 
     ``without`` is the largest error divided by noise [-] without any cause. A nearest cause is named if it at least
-    halves this error, or if it concerns wrong samples, which are detectable whatever else is wrong.
+    halves this error, if it leaves noise, or if it concerns wrong samples, detectable whatever else is wrong.
     """
     if causes.found is not None:
         # An error beyond a limit is more than usual, of whatever kind it is.
@@ -274,7 +274,9 @@ def _why(causes: Diagnosis, without: float, passes: bool) -> str:
     if not (causes.tried or causes.kinds):
         return ""
     said, nearest = "no single change explains the residual", causes.nearest
-    if nearest is not None and (nearest.is_of_samples or nearest.left <= _EXPLAINS * without):
+    if causes.has_second:
+        said += ", for a second one is seen beside the nearest"
+    if nearest is not None and (causes.has_second or nearest.is_of_samples or nearest.left <= _EXPLAINS * without):
         texts = [
             f"{cause.in_words}, which leaves {_times(cause.left)} times the noise" for cause in (nearest, *nearest.same)
         ]

@@ -94,9 +94,10 @@ _Trial = tuple[Cause, ModelChange, Floats, float]
 class Diagnosis:
     """Result of the search for a cause of a disagreement.
 
-    ``found`` is the cause, if any; ``nearest`` is the best candidate if none explains the recordings. ``tried`` is the
-    number of candidates compared, ``kinds`` the kinds of causes where not all were tried. ``is_noise`` is true if the
-    residuals are noise, so that no cause is needed.
+    ``found`` is the cause, if any; ``nearest`` is the best candidate if none explains the recordings, ``has_second``
+    true if it leaves noise with a second change in it. ``tried`` is the number of candidates compared, ``kinds`` the
+    kinds of causes where not all were tried. ``is_noise`` is true if the residuals are noise, so that no cause is
+    needed.
     """
 
     found: Cause | None = None
@@ -104,6 +105,7 @@ class Diagnosis:
     tried: int = 0
     is_noise: bool = False
     kinds: str = ""
+    has_second: bool = False
 
 
 @on_one_thread
@@ -480,7 +482,7 @@ class CauseSearch:
         # One Jacobian, at the first cause, shows what a second one would add and what could replace it.
         slopes = self.slopes(first.fitted, first.residuals.errors, sized) if is_fitted else []
         if self.needs_another(first, slopes):
-            return Diagnosis(None, first, len(tried))
+            return Diagnosis(None, first, len(tried), has_second=True)
         # With errors of sensors that any bench has, other small changes may explain as much as one alone.
         others = self.beside_usual(slopes, {cause.name for cause in explaining})
         return Diagnosis(self.best_of(explaining, others), None, len(tried))
