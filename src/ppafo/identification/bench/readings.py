@@ -154,10 +154,10 @@ def meter_readings(
 ) -> tuple[Floats, Flags, tuple[str, ...]]:
     """Return flow meter readings with sign [kg/s], flags of possible readings, and remarks on the others.
 
-    Under every law gas flows from the higher to the lower pressure. A meter that never shows a negative flow has no
-    sign; if the flow was reversed in many readings, each reading gets the sign of ``direction``. Otherwise a reading
-    against its direction is impossible, with a signed meter only beyond its ``zero`` error [fraction of the largest
-    reading].
+    Under every law gas flows from the higher to the lower pressure. A meter that shows no negative flow beyond its
+    ``zero`` error [fraction of the largest reading] has no sign; if the flow was reversed in many readings, each
+    reading gets the sign of ``direction``. Otherwise a reading against its direction is impossible, with a meter that
+    shows negative flows only beyond that error.
 
     Arguments: ``direction`` (readings,) of all recordings, positive for a positive flow; ``used`` marks the readings
     that count, default all. Raises IdentificationError if more than a tenth are impossible.
@@ -165,8 +165,10 @@ def meter_readings(
     flow = pool(sources, "mass_flow")
     counted = np.ones(flow.size, dtype=np.bool_) if used is None else used
     largest = float(np.abs(flow[counted]).max(initial=0.0))
-    has_sign = bool((flow[counted] < 0.0).any())
-    against = counted & (direction * flow < 0.0) & (np.abs(flow) > (zero * largest if has_sign else 0.0))
+    # A shut valve gives readings of both signs by the zero of the meter.
+    lowest = float(flow[counted].min(initial=0.0))
+    has_sign = lowest < -zero * largest
+    against = counted & (direction * flow < 0.0) & (np.abs(flow) > (zero * largest if lowest < 0.0 else 0.0))
     many = _MOST_IMPOSSIBLE * np.count_nonzero(counted)
     if not has_sign and np.count_nonzero(against) > many:
         return np.where(direction < 0.0, -flow, flow), counted, ()
