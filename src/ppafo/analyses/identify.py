@@ -36,6 +36,8 @@ _FAR_FROM_SET = 5.0
 """Ratio to the value of the set from which it is remarked on [-]: psi read as kPa makes 6.89."""
 _FILES_IN_TITLE = 4
 """Largest number of recordings named in the title of the new set; the notes of the set name all."""
+_ROW_TIME = 1.0
+"""Time between the rows of a table of steady readings without times [s]."""
 _REPORTED = "reported."
 """Prefix of the paths of values that a publication reports about its own device."""
 
@@ -318,7 +320,8 @@ def _tasks_in_order(reader: _RecordingReader) -> list[_Task]:
 
     tasks = []
     for number, procedure in enumerate(reader.problem.procedure, start=1):
-        row_time, gas = procedure.row_time, getattr(procedure, "gas", None)
+        row_time = _ROW_TIME if procedure.kind in procedure.steady else None
+        gas = getattr(procedure, "gas", None)
         sources: list[RecordingSource] = []
         for recording in procedure.recordings:
             wrong = list[PpafoError]()

@@ -290,5 +290,4 @@ def test_a_recording_that_begins_in_motion_has_velocity_and_valve_of_its_start(
     recording = simulate(scenario).recording
     begin = float(recording.time[int(np.argmax(np.gradient(recording["angle"], recording.time) > 2.0))])
     cut = only(recording.between(begin, 0.5), "command", "angle", "pressure_1", "pressure_2")
-    assert cut["command"][0] != 0.0
     assert max(shares(agree(cut, scenario.device)).values()) < 5e-3

@@ -413,7 +413,7 @@ class OpenValveFlowProblem(FlowLaw):
     """Table of procedure open-valve-flow: Cd, or C and b of ISO 6358, of the fully open valve."""
 
     needed = CHANNELS
-    row_time = 1.0
+    steady = ("open-valve-flow",)
     kind: Literal["open-valve-flow"]
     valve: str | None = keyed(VALVE, None)
     law: Law = keyed("flow law, also the form in which the set gives it", "orifice")

@@ -96,12 +96,12 @@ class BenchContext:
 class BenchLaw(ABC):
     """Table of a bench law: the keys that every law has, and what is declared of it.
 
-    ``needed``: channels of every recording. ``row_time``: time [s] between rows of a table without a time column; None
-    for a law over time. ``own_errors``: errors of sensors that may differ between its recordings.
+    ``needed``: channels of every recording. ``steady``: its kinds that need no times. ``own_errors``: errors of sensors
+    that may differ between its recordings.
     """
 
     needed: ClassVar[tuple[str, ...]]
-    row_time: ClassVar[float | None] = None
+    steady: ClassVar[tuple[str, ...]] = ()
     own_errors: ClassVar[tuple[str, ...]] = ()
     kind: str
     recordings: tuple[str, ...] = keyed("files, relative to this one")

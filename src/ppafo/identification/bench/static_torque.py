@@ -226,7 +226,7 @@ class StaticTorqueProblem(BenchLaw):
     """
 
     needed = (TORQUE, "pressure_difference", "direction")
-    row_time = 1.0
+    steady = ("static-torque",)
     own_errors = ("zero",)
     kind: Literal["static-torque"]
 

@@ -139,7 +139,7 @@ class ValveMapProblem(FlowLaw):
     """Table of procedure valve-map: dead band, gain, saturation and hysteresis from flow over command."""
 
     needed = CHANNELS
-    row_time = 1.0
+    steady = ("valve-map",)
     kind: Literal["valve-map"]
     valve: str | None = keyed(VALVE, None)
     nodes: tuple[float, ...] = keyed("commands of a table of openings; default: straight beyond a dead band", ())

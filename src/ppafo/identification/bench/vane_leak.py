@@ -307,6 +307,7 @@ class VaneLeakProblem(FlowLaw, TimedLaw):
     """
 
     needed = CHANNELS
+    steady = ("vane-leak-steady",)
     kind: Literal["vane-leak", "vane-leak-steady"]
     angle: float | None = keyed(Number("rad", "vane angle, from which the set's volumes follow"), None)
     law: Law = keyed(
@@ -375,7 +376,7 @@ class VaneLeakProblem(FlowLaw, TimedLaw):
             known_ratio = None if each == "iso6358" else critical_ratio
             size = size_of("leak", "actuator.leak", form, known_ratio, of_set)
             laws.append(Opening(gas, form, discharge_coefficient or PRODUCT_ONLY, known_ratio, size, _GAP))
-        if self.kind == "vane-leak-steady" or all("mass_flow" in source.recording for source in sources):
+        if self.kind in self.steady or all("mass_flow" in source.recording for source in sources):
             result = _steady_leak(sources, laws, context.tolerances, self.confidence)
         else:
             window = self.start, self.end
