@@ -352,7 +352,7 @@ def _verdict(base: Scenario, path: VariedPath, value: float, has_remedy: bool) -
     verdict = tried(result.scenario, result.tracking)
     lacking = float(shortfall(result.scenario).max())
     said = verdict.sentence
-    # What follows by what the limits allow, but is no value to be found.
+    # A value that follows within the limits may lie beyond reach, and is none to be found.
     if not verdict.fails and lacking > 0.0 and changes_reach([path.path]):
         said = f"{CRITERION_TEXTS['reach']} {change_text(result.scenario.controlled, lacking)}"
     elif verdict.fails and not has_remedy:

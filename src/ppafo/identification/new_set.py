@@ -25,6 +25,8 @@ from ppafo.units import from_si, to_si
 _AREA_NAMES, _SONIC_NAMES = ({item.name for item in form} for form in (AREA_FORM, SONIC_FORM))
 _TABLE = f"{SECTION}.opening."
 _FORMS = ((_AREA_NAMES, _SONIC_NAMES), (_SONIC_NAMES, _AREA_NAMES))
+_DIGITS = 3
+"""Significant digits of the half-width to which a value is rounded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,10 +106,6 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Qu
     note = f"as {estimate.path} was identified"
     numbers |= {path: Entry(beside, "", "derived", entry.source, note) for path, beside in estimate.beside.items()}
     return replace(parameter_set, numbers=numbers)
-
-
-_DIGITS = 3
-"""Significant digits of the half-width to which a value is rounded."""
 
 
 def _in_digits_of(value: float, half_width: float) -> float:

@@ -31,6 +31,36 @@ from ppafo.validation.replay import Replay, replayed_scenario
 from ppafo.validation.settings import ANGLE, PRESSURE_1, PRESSURE_2, Motion
 from ppafo.wording import argument_text
 
+_STARTS = (-0.05, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.05)
+"""Trial initial values of a channel whose first samples are wrong, as fractions of its range [-].
+
+The two outermost values lie outside the range, and a best fit there is rejected.
+"""
+_AT_REST = 2.0
+"""Ratio of the angle's standard deviation to its noise [-] below which the vane may be locked."""
+_GAINS = (0.3, 0.6, 0.8, 0.95, 0.98, 1.02, 1.05, 1.25, 1.6, 3.0)
+"""Trial gains of a sensor [-]."""
+_LONG_DELAYS = (0.015, 0.03, 0.05, 0.08, 0.12)
+"""Trial delays [s] of all sensors with respect to the command, beyond the common delay that is removed."""
+_SHIFTS = (0.0005, 0.001, 0.003, 0.008, 0.015, 0.03, 0.05, 0.08, 0.12)
+"""Trial times [s] by which all sensors lead the command, of which none is removed, and delays of a valve with none."""
+_RATES = (0.7, 0.85, 0.94, 0.98, 0.995, 1.005, 1.02, 1.06, 1.15, 1.4)
+"""Trial rates [-] of the clock of a recording."""
+_FACTORS: tuple[float, ...] = (0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 1.05, 1.25, 2.0, 5.0, 20.0)
+"""Trial values of a parameter divided by its value in the set [-]."""
+_OF_A_GAS = 5
+"""Number of trial values of a property of the gas, in geometric progression."""
+_ATMOSPHERES = (0.6, 0.7, 0.8, 0.9, 0.95, 1.03, 1.1)
+"""Trial atmospheric pressures divided by the pressure in the set [-]: from a high mountain to a deep mine."""
+_SECTIONS = ("valve", "actuator", "friction", "foot_plate", "supply", "gas", "effects")
+"""Sections of the parameter set whose parameters are tried, in this order; effects that the set names alone."""
+_NOT_TRIED = "actuator.restitution"
+"""Parameter observable only when the vane reaches a stop; a replay starts between the stops."""
+_CURVED = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+"""Commands at which a curved opening is a table [-]."""
+_POWERS = (0.4, 0.7, 1.4, 2.0, 3.0)
+"""Trial powers of the command to which an opening is proportional [-]."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cause:
@@ -123,15 +153,6 @@ class Cause:
         return self.residuals.is_noise and self.gain > 0.0
 
 
-_STARTS = (-0.05, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.05)
-"""Trial initial values of a channel whose first samples are wrong, as fractions of its range [-].
-
-The two outermost values lie outside the range, and a best fit there is rejected.
-"""
-_AT_REST = 2.0
-"""Ratio of the angle's standard deviation to its noise [-] below which the vane may be locked."""
-
-
 def of_samples(records: Sequence[Record]) -> Iterator[Cause]:
     """Yield the faulty samples of all channels as a single cause; nothing without faulty samples."""
     faulty = [record for record in records if record.words]
@@ -174,16 +195,8 @@ def _both_ways(*sizes: float) -> tuple[float, ...]:
 # Grids are so fine that two Gauss-Newton steps reach the least squares, and no likely fault lies at one of their ends.
 _ZEROS = _both_ways(0.003, 0.01, 0.03, 0.1, 0.3, 0.6)
 """Trial zero offsets of angle [rad], command [full openings] and pressures [gauge supply pressures]."""
-_GAINS = (0.3, 0.6, 0.8, 0.95, 0.98, 1.02, 1.05, 1.25, 1.6, 3.0)
-"""Trial gains of a sensor [-]."""
 _DELAYS = _both_ways(0.001, 0.003, 0.006, 0.012, 0.025)
 """Trial delays of a sensor relative to the other sensors [s]."""
-_LONG_DELAYS = (0.015, 0.03, 0.05, 0.08, 0.12)
-"""Trial delays [s] of all sensors with respect to the command, beyond the common delay that is removed."""
-_SHIFTS = (0.0005, 0.001, 0.003, 0.008, 0.015, 0.03, 0.05, 0.08, 0.12)
-"""Trial times [s] by which all sensors lead the command, of which none is removed, and delays of a valve with none."""
-_RATES = (0.7, 0.85, 0.94, 0.98, 0.995, 1.005, 1.02, 1.06, 1.15, 1.4)
-"""Trial rates [-] of the clock of a recording."""
 _EXACT = SensorErrors(zero=0.0, gain=0.0, delay=0.0)
 """Usual sensor errors of a command: none, because a command is not read by a sensor."""
 
@@ -279,8 +292,6 @@ def _groups(names: Collection[str]) -> Iterator[tuple[tuple[str, ...], str, str]
         yield channels, words, "seem" if has_several else "seems"
 
 
-_FACTORS: tuple[float, ...] = (0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 1.05, 1.25, 2.0, 5.0, 20.0)
-"""Trial values of a parameter divided by its value in the set [-]."""
 _OFF = {
     "s": _SHIFTS,
     "": (0.002, 0.006, 0.02, 0.06, 0.2, 0.6),
@@ -303,14 +314,6 @@ _OF_GASES = {
     "gas.temperature": (250.0, 340.0),
 }
 """Ends of what gases in use and rooms have [SI]; other values are no cause."""
-_OF_A_GAS = 5
-"""Number of trial values of a property of the gas, in geometric progression."""
-_ATMOSPHERES = (0.6, 0.7, 0.8, 0.9, 0.95, 1.03, 1.1)
-"""Trial atmospheric pressures divided by the pressure in the set [-]: from a high mountain to a deep mine."""
-_SECTIONS = ("valve", "actuator", "friction", "foot_plate", "supply", "gas", "effects")
-"""Sections of the parameter set whose parameters are tried, in this order; effects that the set names alone."""
-_NOT_TRIED = "actuator.restitution"
-"""Parameter observable only when the vane reaches a stop; a replay starts between the stops."""
 _OF_SUPPLY = {PRESSURE_PATH: SUPPLY, SECOND_PRESSURE_PATH: DORSIFLEXION_SUPPLY}
 
 
@@ -404,10 +407,6 @@ _EFFECTS: tuple[tuple[str, tuple[str, ...], dict[str, float], str, float, str], 
     ),
 )
 """Effects that a device may have: settings equal to the magnitude, other settings, unit, shown units in 1 SI, words."""
-_CURVED = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
-"""Commands at which a curved opening is a table [-]."""
-_POWERS = (0.4, 0.7, 1.4, 2.0, 3.0)
-"""Trial powers of the command to which an opening is proportional [-]."""
 
 
 def of_effects(device: Device) -> Iterator[Cause]:

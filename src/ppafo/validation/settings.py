@@ -13,6 +13,18 @@ from ppafo.wording import known_names, one_line
 
 ANGLE, PRESSURE_1, PRESSURE_2 = "angle", "pressure_1", "pressure_2"
 PRESSURE_DIFFERENCE, TORQUE = "pressure_difference", "torque"
+ACCEPTABLE_FRACTION = 0.03
+"""Largest RMS error of an acceptable model as a fraction of the full range [-].
+
+The paper calls 10 % acceptable (page with figure 7); a lag of 10 ms of both pressures would pass there.
+"""
+EXPLAINED_FRACTION = 0.5
+"""Least explained fraction of signal variance (R^2) [-] for an acceptable model; the mean explains 0."""
+_FRACTION_UNITS = ("%", "percent")
+DEFAULT_LIMIT = 0.02
+"""Default limit of the estimated delay [s]; sensors, filters and valves lag less."""
+LARGEST_DELAY = 1.0
+"""Largest delay limit that a user may set [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,17 +66,6 @@ The full range of the torque follows from equation (2). A pressure difference ra
 full supply on the other.
 """
 
-ACCEPTABLE_FRACTION = 0.03
-"""Largest RMS error of an acceptable model as a fraction of the full range [-].
-
-The paper calls 10 % acceptable (page with figure 7); a lag of 10 ms of both pressures would pass there.
-"""
-
-EXPLAINED_FRACTION = 0.5
-"""Least explained fraction of signal variance (R^2) [-] for an acceptable model; the mean explains 0."""
-
-_FRACTION_UNITS = ("%", "percent")
-
 
 @dataclass(frozen=True, slots=True)
 class ErrorLimit:
@@ -103,10 +104,6 @@ def parse_thresholds(texts: Iterable[str] = ()) -> dict[str, ErrorLimit]:
 Motion = Literal["free", "measured", "locked", "leg"]
 """Motion of the vane in a replay: free, prescribed as recorded, locked, or with a foot."""
 MOTIONS: tuple[Motion, ...] = ("free", "measured", "locked", "leg")
-DEFAULT_LIMIT = 0.02
-"""Default limit of the estimated delay [s]; sensors, filters and valves lag less."""
-LARGEST_DELAY = 1.0
-"""Largest delay limit that a user may set [s]."""
 _UNITS = {ANGLE: "rad", PRESSURE_1: "Pa_a", PRESSURE_2: "Pa_a"}
 """Unit of an initial value by channel."""
 
