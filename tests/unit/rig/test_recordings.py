@@ -201,13 +201,9 @@ def test_the_truth_names_preset_overrides_and_device() -> None:
     [
         ({"experiment": "step-respons"}, "did you mean 'step-response'"),
         ({"preset": "paper-bensh"}, "did you mean 'paper-bench'"),
-        ({"seed": -1}, "seed = -1"),
-        ({"device": "ppafo2012"}, "ppafo2011"),
         ({"overrides": ["rig.bench.friction_scater=0"]}, "did you mean 'rig.bench.friction_scatter'"),
         ({"overrides": ["rig.bench.friction_scatter=2"]}, "at least 0 and at most 0.5"),
         ({"overrides": ["rig.bench.rate=3 s"]}, "override 'rig.bench.rate=3 s'"),
-        ({"overrides": ["friction.statik_torque=1 N m"]}, "did you mean"),
-        ({"valve": "solenoyd"}, "did you mean 'solenoid'"),
     ],
 )
 def test_bad_input_is_one_line_with_the_nearest_name(words: dict[str, object], message: str) -> None:
@@ -222,9 +218,6 @@ def test_bad_input_is_one_line_with_the_nearest_name(words: dict[str, object], m
     [
         ("friction_scatter", "friction_scater", "did you mean 'friction_scatter'"),
         ('"-8 K"', '"-8 m"', "bench.gas_difference"),
-        ('"0.3 deg"', '"-0.3 deg"', "must be at least 0"),
-        ('"0.3 deg"', "0.3", "offset"),
-        ("schema_version = 1", "schema_version = 2", "schema_version = 2 is not allowed; allowed: 1"),
         ("effects.stribeck.velocity", "effects.stribek.velocity", "did you mean 'stribeck'"),
     ],
 )

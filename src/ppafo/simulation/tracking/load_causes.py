@@ -15,7 +15,7 @@ from ppafo.model.plant import gravity_torque
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import PRESSURE_PATH
 from ppafo.parameters.reach import static_torque, supply_for, supply_that_moves, torque_reach
-from ppafo.simulation.numbers import declared_numbers, number_at
+from ppafo.simulation.numbers import declared_numbers, number_at, of_its_chambers
 from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.tracking.case import Case, TrackingCause
@@ -97,11 +97,11 @@ def _supplies_for(
 ) -> list[dict[str, float]]:
     """Return supply pressures [Pa absolute] by path for each factor [-] with which the supplies can give all torques.
 
-    A torque is the path of its supply, an angle [rad] and the torque [N m] there, which the factor multiplies.
+    A torque is the path of its supply (of a chamber that there is), an angle [rad] and the torque there [N m].
     """
     trials = [{path: supply_for(device, at, factor * torque) for path, at, torque in torques} for factor in factors]
     found = [{path: pressure for path, pressure in each.items() if pressure is not None} for each in trials]
-    return [each for each, trial in zip(found, trials, strict=True) if len(each) == len(trial)]
+    return [each for each, trial in zip(found, trials, strict=True) if len(of_its_chambers(each, device)) == len(trial)]
 
 
 def torque_peaks(case: Case) -> tuple[TorqueReach, TorqueReach]:
