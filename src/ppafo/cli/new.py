@@ -203,7 +203,7 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
         return text
     head, rest = text[: named.start()], text[named.end() :]
     if kind == "set" and source is not None:
-        # 'ppafo sets audit' then shows the changes of the copy, not those of the source.
+        # 'ppafo sets audit' then lists the changes of the copy, not those of the source.
         parent = source if source in files.names() else os.path.relpath(source, path.parent)
         rest = f"\nparent = {value_text(parent)}{_PARENT_LINE.sub('', rest, count=1)}"
         # Title and notes are of the other device; the citation stays, to which the sources of its values refer.

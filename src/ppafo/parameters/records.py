@@ -2,7 +2,7 @@
 
 A field is a key of the file, optional if it has a default. Its type says what may stand there: a text, a word of a
 ``Literal``, a number, a list (``tuple``), tables by name (``dict``), another record, or one of several records that
-their ``kind`` tells apart. ``keyed``, or a ``Number``, ``Words`` or ``Many`` in its annotation, says the rest. Lists
+their ``kind`` tells apart. ``keyed``, or a ``Number``, ``Words`` or ``Many`` in its annotation, states the rest. Lists
 and tables that are required have at least one item, and a text is empty only if that is its default.
 """
 

@@ -225,10 +225,8 @@ def of_sensors(device: Device, names: Collection[str], units: Mapping[str, Abstr
             words = f"the zero of {group} seems to be off by {{:+.3g}} {unit}"
             zeros, change = tuple(size * part for part in _ZEROS), partial(_sensed, channels, "zero", 0.0)
             yield Cause(f"zero of {group}", words, change, zeros, shown=shown, usual=usual.zero)
-            words, change = (
-                f"{group} {verb} to read {{:.4g}} times the true value",
-                partial(_sensed, channels, "gain", about),
-            )
+            words = f"{group} {verb} to read {{:.4g}} times the true value"
+            change = partial(_sensed, channels, "gain", about)
             yield Cause(f"gain of {group}", words, change, _GAINS, is_ratio=True, usual=usual.gain)
         read_as = ("gauge read as absolute", -about), ("absolute read as gauge", about)
         for kind, zero in read_as if si_unit == "Pa" else ():
@@ -242,10 +240,8 @@ def of_sensors(device: Device, names: Collection[str], units: Mapping[str, Abstr
     sensors = tuple(name for name in SENSORS if name in names)
     # Of one sensor alone the delay is the one of all, which is taken out.
     for name in sensors if len(sensors) > 1 else ():
-        words, change = (
-            f"{name} seems to lag the other channels by {{:.3g}} ms",
-            partial(_sensed, (name,), "delay", 0.0),
-        )
+        words = f"{name} seems to lag the other channels by {{:.3g}} ms"
+        change = partial(_sensed, (name,), "delay", 0.0)
         yield Cause(f"delay of {name}", words, change, _DELAYS, shown=1.0e3, usual=usual_errors(name).delay)
     leads = tuple(-lead for lead in _SHIFTS)
     for noun, verb, delays, shown in (("delay", "lag", _LONG_DELAYS, 1.0e3), ("lead", "lead", leads, -1.0e3)):

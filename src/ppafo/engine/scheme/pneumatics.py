@@ -228,7 +228,7 @@ def linearise(per_mass_1: float, per_mass_2: float, flowing: SlopedFlows, step: 
 
 
 def inverse_determinant(a: float, b: float, c: float, d: float) -> float:
-    """One divided by the determinant of a matrix [-], whose elements are given by rows."""
+    """Inverse of the determinant of a matrix [-], whose elements are given by rows."""
     return 1.0 / (a * d - b * c)
 
 

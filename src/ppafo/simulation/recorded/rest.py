@@ -32,7 +32,7 @@ _LEAST_RANK = 1.0e-6
 class ReplayStart:
     """Angle [rad], angular velocity [rad/s] and pressures [Pa absolute] at the first sample.
 
-    ``velocity_error`` is the standard error of a velocity that the angles told [rad/s].
+    ``velocity_error`` is the standard error of a velocity that was derived from the angles [rad/s].
     """
 
     angle: float

@@ -440,9 +440,11 @@ def _poor_sensors(case: Case) -> TrackingCause | None:
     # Gains are changed with less effort than sensors.
     remedies = [*rescaled_gains(scenario, case.law, (0.5,))]
     remedies += [remedy(scenario, {path: number / factor}) for path, number in found.items() for factor in _LESS]
-    told = [stated_number(scenario, path) for path in found]
-    late = f"the measured {CONTROLLED[scenario.controlled].words} comes late ({told.pop(0)})" if _DELAY in found else ""
-    others = f"the sensors are not accurate enough for the controlled quantity ({', '.join(told)})" if told else ""
+    stated = [stated_number(scenario, path) for path in found]
+    late = (
+        f"the measured {CONTROLLED[scenario.controlled].words} comes late ({stated.pop(0)})" if _DELAY in found else ""
+    )
+    others = f"the sensors are not accurate enough for the controlled quantity ({', '.join(stated)})" if stated else ""
     return TrackingCause(", and ".join(filter(None, (late, others))), tuple(remedies))
 
 
