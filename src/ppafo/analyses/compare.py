@@ -346,7 +346,8 @@ def _drawn_runs(
 
     from ppafo.simulation.numbers import NOISE_SEED
     from ppafo.studies.sampling import with_new_noise
-    from ppafo.study.runs import RunCounter, excess, scenario_runs, unvaried, with_companions
+    from ppafo.study.blocks import unvaried
+    from ppafo.study.runs import RunCounter, scenario_runs
 
     if not uncertainty.drawn:
         return {}
@@ -357,15 +358,14 @@ def _drawn_runs(
         columns = {path: np.concatenate([column, again[path]]) for path, column in columns.items()}
     counter = RunCounter(max(map(len, columns.values())) * len(scenarios), progress)
     for (task, name), scenario in scenarios.items():
-        runs = scenario_runs(scenario, with_companions(metrics, scenario), counter, uncertainty.gauge, threads)
+        runs = scenario_runs(scenario, metrics, counter, uncertainty.gauge, threads)
         # The noise is in all configurations, even if the study varies other paths in some of them only.
         paths = [path for path in columns if study is None or path == NOISE_SEED or study.varies(path, name)]
         varied = {path: columns[path] for path in paths} or unvaried(scenario, count)
         rows = runs.run(varied)
         first = {metric: values[:count] for metric, values in rows.items()}
         runs.check(first, maximum_failed, f"configuration '{name}', task '{task}'")
-        verdicts = excess(first, scenario, {path: column[:count] for path, column in varied.items()}, uncertainty.gauge)
-        drawn[task, name] = rows, runs.reason, verdicts.passes
+        drawn[task, name] = rows, runs.reason, first["passes"]
     return drawn
 
 

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from ppafo.report.kind import Kind
     from ppafo.report.panels import Panel
     from ppafo.simulation.scenario import Scenario
-    from ppafo.simulation.tracking.rule import TrackingExcess
     from ppafo.studies.distributions import Floats
     from ppafo.studies.limits import MetricLimit
     from ppafo.studies.varying import VariedPath
@@ -140,7 +139,7 @@ def find(
     from ppafo.simulation.numbers import NOISE_SEED
     from ppafo.studies.draws import seeds_of_noise
     from ppafo.studies.study import with_overrides
-    from ppafo.study.runs import RunCounter, excess, scenario_runs, settled, with_companions
+    from ppafo.study.runs import RunCounter, scenario_runs
 
     base = with_overrides(scenario_or_load(scenario), overrides)
     # As in 'supply.pressure=2..6 bar_g' and 'final_error <= 30 N cm'.
@@ -158,15 +157,13 @@ def find(
         streams, reach_varies = max(1, seeds.size), changes_reach([path.path])
         wanted = "highest" if highest else "lowest"
         counter = RunCounter(grid * streams, progress)
-        runs = scenario_runs(base, with_companions([limit.metric], base), counter, (), threads)
+        runs = scenario_runs(base, [limit.metric], counter, (), threads)
 
         def tried(values: Floats) -> Rows:
             columns = {path.path: np.tile(values, streams)}
             if seeds.size:
                 columns[NOISE_SEED] = np.repeat(seeds, values.size)
-            rows = runs.run(columns)
-            verdicts = excess(rows, base, columns)
-            return judged(rows[limit.metric], settled(rows, limit.metric), verdicts, limit, reach_varies, streams)
+            return judged(runs.run(columns), limit, reach_varies, streams)
 
         rows, index, outer = outermost(tried, low, high, grid, highest)
         values, is_met, remarks = rows["value"], rows["is_met"], []
@@ -299,10 +296,8 @@ def outermost(
         rows = {name: np.concatenate([column, more[name]])[order] for name, column in rows.items()}
 
 
-def judged(
-    metric: Floats, settled: Floats, verdicts: TrackingExcess, limit: MetricLimit, reach_varies: bool, streams: int
-) -> Rows:
-    """Return columns (values,) of runs (streams * values,), given by metric, number in its place if it swings, verdict.
+def judged(runs: Rows, limit: MetricLimit, reach_varies: bool, streams: int) -> Rows:
+    """Return columns (values,) of judged runs (streams * values,).
 
     - ``metric``, ``spread``: mean and standard deviation over the noise streams [SI]; nan if a run failed
     - ``judged``: number compared with the limit: the mean of ``settled``; nan if the loop oscillates throughout
@@ -316,18 +311,18 @@ def judged(
         return runs.reshape(streams, -1)
 
     # Nobody would build on a loop whose command turns all the time.
-    oscillates = verdicts.oscillates == 1.0
-    fails = verdicts.passes == 0.0
+    metric, settled = runs[limit.metric], runs[f"judged_{limit.metric}"]
+    oscillates, fails = runs["oscillates"] == 1.0, runs["passes"] == 0.0
     if limit.text == FOLLOWS:
         # A run without a verdict is none that follows, and a torque just beyond the actuator's is not reached.
-        fails |= np.isnan(verdicts.follows) | ((verdicts.beyond_reach > 0.0) & reach_varies)
+        fails |= np.isnan(runs["follows"]) | ((runs["beyond_reach"] > 0.0) & reach_varies)
     number = by_value(np.where(oscillates, np.nan, settled)).mean(axis=0)
     is_kept, follows = np.asarray(limit.is_kept(number)), np.logical_not(by_value(fails).any(axis=0))
     return {
         "metric": by_value(metric).mean(axis=0),
         "judged": number,
         "spread": by_value(metric).std(axis=0, ddof=min(1, streams - 1)),
-        "excess": by_value(verdicts.largest).max(axis=0),
+        "excess": by_value(runs["excess"]).max(axis=0),
         "follows": follows,
         "is_kept": is_kept,
         "is_met": is_kept & follows,

@@ -47,17 +47,7 @@ from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, diff
 from ppafo.studies.loading import list_studies, load_study, read_source
 from ppafo.studies.study import with_overrides
 from ppafo.studies.varying import VariedPath, given_in, in_its_unit, value_at, varied_path
-from ppafo.study.runs import (
-    FAILED,
-    Rows,
-    RunCounter,
-    Runs,
-    oscillating,
-    scenario_runs,
-    settled,
-    tracking_violation,
-    with_companions,
-)
+from ppafo.study.runs import Rows, RunCounter, Runs, scenario_runs
 from ppafo.units.shown import in_units, quantity_of_unit
 from ppafo.wording import count_of, first_twice, percentage, without_exponent
 
@@ -517,10 +507,9 @@ def solve_tuning(
     of_start = len(problem.searched) * (effort.candidates_per_gain * (effort.generations + 1) + _REFINEMENTS)
     most = problem.draws * (effort.starts * of_start + 3) + (0 if uncertainty is None else 2 * FRESH_DRAWS)
     counter = RunCounter(most, lambda now: report(replace(now, activity="tuning", is_bound=True)))
-    metrics = with_companions([*problem.is_worse_high], problem.scenario)
-    runs = scenario_runs(problem.scenario, metrics, counter, problem.gauge, threads, executor)
+    runs = scenario_runs(problem.scenario, [*problem.is_worse_high], counter, problem.gauge, threads, executor)
     draws = {} if uncertainty is None else uncertainty.random_columns(0, problem.draws, problem.seed)
-    tried = _tried(runs, problem, {path: [value] for path, value in problem.before.items()}, draws)
+    tried = _tried(runs, {path: [value] for path, value in problem.before.items()}, draws)
     scales = dict[str, float]()
     for goal in problem.goals:
         # By default each goal is 1 before tuning: goals in different units then weigh as much as their weights say.
@@ -537,7 +526,7 @@ def solve_tuning(
         # As they are pasted: what keeps a constraint by less than the last digit would break it.
         candidates = [problem.gains(each) for each in fractions.tolist()]
         values = {gain.path: np.array([gains[gain.path] for gains in candidates]) for gain in problem.searched}
-        return judge(_tried(runs, problem, values, draws), problem, scales)["cost"]
+        return judge(_tried(runs, values, draws), problem, scales)["cost"]
 
     starts = search(costs, [gain.fraction(gain.before) for gain in problem.searched], effort)
     before, after = (
@@ -562,25 +551,18 @@ def solve_tuning(
     return _finding(replace(tuned, remarks=_remarks(tuned)))
 
 
-def _tried(
-    runs: Runs, problem: Problem, values: Mapping[str, Sequence[float] | Floats], draws: Mapping[str, Floats]
-) -> Rows:
+def _tried(runs: Runs, values: Mapping[str, Sequence[float] | Floats], draws: Mapping[str, Floats]) -> Rows:
     """Run every candidate with every draw; returns arrays (candidates, draws), with one draw without uncertainty.
 
     ``values`` are the gains by path, each (candidates,); ``draws`` are the uncertain values by path, each (draws,).
-    Beside the metrics the rows have ``judged_NAME``, by which candidates are ranked, ``unusable`` for failed and
-    oscillating runs, and ``off``, the fraction by which a run exceeds the tracking limits.
+    Candidates are ranked by ``judged_NAME``, ``off`` and ``unusable``: gains with which the loop oscillates are no
+    better than ones with which the run fails.
     """
     candidates = len(next(iter(values.values())))
     count = len(next(iter(draws.values()))) if draws else 1
     columns = {path: np.repeat(column, count) for path, column in values.items()}
     columns |= {path: np.tile(column, candidates) for path, column in draws.items()}
-    rows, names = runs.run(columns), [*problem.is_worse_high]
-    found: Rows = {name: rows[name] for name in names} | {f"judged_{name}": settled(rows, name) for name in names}
-    # Gains with which the loop oscillates are no better than ones with which the run fails.
-    found["unusable"] = rows[FAILED] | oscillating(rows, problem.scenario)
-    found["off"] = tracking_violation(rows, problem.scenario, columns, problem.gauge)
-    return {name: column.reshape(candidates, count) for name, column in found.items()}
+    return {name: column.reshape(candidates, count) for name, column in runs.run(columns).items()}
 
 
 def judge(rows: Rows, problem: Problem, scales: Mapping[str, float]) -> Rows:
@@ -705,11 +687,11 @@ def _evaluate(
 ) -> GainResult:
     """Return the result of a set of gains over the draws of the search, over fresh draws and on the nominal device."""
     candidate, fresh = {path: [value] for path, value in gains.items()}, dict[str, Floats]()
-    over_fresh = in_search = _tried(runs, problem, candidate, draws)
+    over_fresh = in_search = _tried(runs, candidate, draws)
     if problem.uncertainty is not None:
         # Draws that follow those of the search: the gains were not chosen on them.
         fresh = problem.uncertainty.random_columns(problem.draws, FRESH_DRAWS, problem.seed)
-        over_fresh = _tried(runs, problem, candidate, fresh)
+        over_fresh = _tried(runs, candidate, fresh)
     scores, fresh_scores = (
         {name: float(values[0]) for name, values in judge(rows, problem, scales).items()}
         for rows in (in_search, over_fresh)

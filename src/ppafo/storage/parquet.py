@@ -129,14 +129,11 @@ def encode_texts(codes: "np.ndarray[Any, Any]", texts: Sequence[str]) -> "pa.Dic
     return pa.DictionaryArray.from_arrays(pa.array(codes, type=pa.int8()), pa.array(list(texts), type=pa.string()))
 
 
-def texts_of_some(texts: Mapping[int, str], length: int) -> "pa.Array":
-    """Return a column of ``length`` texts, empty except for the rows in ``texts`` (index from 0)."""
+def as_texts(texts: "Sequence[str | None] | np.ndarray[Any, Any]") -> "pa.Array":
+    """Return a text column, with empty cells for None."""
     import pyarrow as pa
 
-    column: list[str | None] = [None] * length
-    for number, text in texts.items():
-        column[number] = text
-    return pa.array(column, type=pa.string())
+    return pa.array(texts, type=pa.string())
 
 
 def lists_of(values: "np.ndarray[Any, Any]") -> "pa.ListArray":

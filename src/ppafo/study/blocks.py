@@ -109,4 +109,10 @@ def drawn_values(study: Study, runs: NDArray[np.int64]) -> dict[str, Floats]:
 def varied_columns(study: Study, configuration: Configuration, values: dict[str, Floats]) -> dict[str, Floats]:
     """Return the columns of varied values that apply in a configuration, and of paths that share these values."""
     own = {path: column for path, column in values.items() if study.varies(path, configuration.name)}
-    return with_followers(own, study.same_in(configuration.name))
+    count = len(next(iter(values.values()), ())) or 1
+    return with_followers(own, study.same_in(configuration.name)) or unvaried(configuration.scenario, count)
+
+
+def unvaried(scenario: Scenario, runs: int) -> dict[str, Floats]:
+    """Return columns that leave a scenario unchanged, because an ensemble needs at least one column."""
+    return {"supply.pressure": np.full(runs, scenario.device.supply.pressure)}

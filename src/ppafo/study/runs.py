@@ -10,12 +10,11 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.lanes import Count
 from ppafo.errors import ScenarioError, StudyError
 from ppafo.metrics import metric_kind
-from ppafo.metrics.settled import MOST_REVERSALS, VERDICT_METRICS
+from ppafo.metrics.settled import MOST_REVERSALS
 from ppafo.metrics.tracking import ONE_INSTANT
-from ppafo.progress import Progress, Report, report_nothing
+from ppafo.progress import Progress, Report
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble import COMPLETED, run_ensemble
 from ppafo.simulation.ensemble.columns import absolute
@@ -31,12 +30,13 @@ from ppafo.study.blocks import runs_at_once
 from ppafo.study.executing import computed_by
 
 Rows = dict[str, NDArray[Any]]
-"""Columns of one length: metrics by name [SI], nan if a run lacks the metric; and ``failed``, True for a failed run."""
-Evaluation = Callable[[Mapping[str, Floats]], tuple[Rows, str]]
-"""Function from columns of varied values to rows of metrics, and the reason why the first run failed ("" if none)."""
+"""Columns of one length, as ``run_judged`` returns them."""
+Evaluation = Callable[[Mapping[str, Floats]], Rows]
+"""Function from columns of varied values to rows."""
 _BLOCKS, _FEWEST_OF_BLOCK = 64, 256
 """Number of blocks in which runs are submitted to an executor, and smallest number of runs of a block."""
-FAILED = "failed"
+FAILED, OVER_TIME = "failed", "_over_time"
+"""Name of the column of failed runs, and suffix of the name of a column with a trace."""
 _AT_ONCE, _SLOW_AT_ONCE = 16_384, 32
 """Largest number of runs between two progress reports: in general, and with a Python controller."""
 _FIRST_AT_ONCE, _BETWEEN_REPORTS = 1024, 3.0
@@ -87,47 +87,42 @@ class Runs:
     """
 
     def __init__(
-        self,
-        evaluate: Evaluation,
-        metrics: Sequence[str],
-        counter: RunCounter,
-        at_once: int,
-        executor: Executor | None = None,
+        self, evaluate: Evaluation, counter: RunCounter, at_once: int, executor: Executor | None = None
     ) -> None:
-        self.metrics = tuple(metrics)
         self.count, self.failures, self.reason = 0, 0, ""
         self._evaluate, self._counter, self._at_once, self._executor = evaluate, counter, at_once, executor
 
     def run(self, columns: Mapping[str, Floats]) -> Rows:
-        """Run the model with values [SI] by path, each column (runs,), and return the rows of metrics."""
+        """Run the model with values [SI] by path, each column (runs,), and return its rows."""
         if not self._counter.done:
             # A model may be compiled before the first run ends.
             self._counter.add(0, 0)
-        runs, parts = len(next(iter(columns.values()))), dict[int, tuple[Rows, str]]()
-        for number, part in self._parts(columns, runs):
+        parts = dict[int, Rows]()
+        for number, part in self._parts(columns, len(next(iter(columns.values())))):
             parts[number] = part
-            count, failures = part[0][FAILED].size, int(part[0][FAILED].sum())
+            count, failures = part[FAILED].size, int(part[FAILED].sum())
             self.count += count
             self.failures += failures
             self._counter.add(count, failures)
-        found = [parts[number] for number in sorted(parts)]
-        self.reason = self.reason or next((reason for _, reason in found if reason), "")
-        return joined([rows for rows, _ in found])
+        rows = joined([parts[number] for number in sorted(parts)])
+        self.reason = self.reason or next(filter(None, rows["reason"].tolist()), "")
+        return rows
 
-    def _parts(self, columns: Mapping[str, Floats], runs: int) -> Iterator[tuple[int, tuple[Rows, str]]]:
-        """Yield the results of parts of the runs, each with a number by which they are in order."""
+    def _parts(self, columns: Mapping[str, Floats], runs: int) -> Iterator[tuple[int, Rows]]:
+        """Yield the rows of parts of the runs, each with a number by which they are in order."""
+
+        def part(first: int, size: int) -> dict[str, Floats]:
+            return {path: values[first : first + size] for path, values in columns.items()}
+
         if self._executor is not None:
             size = min(self._at_once, max(_FEWEST_OF_BLOCK, math.ceil(runs / _BLOCKS)))
-            blocks = [
-                {path: values[first : first + size] for path, values in columns.items()}
-                for first in range(0, runs, size)
-            ]
+            blocks = [part(first, size) for first in range(0, runs, size)]
             yield from computed_by(self._executor, self._evaluate, blocks)
             return
         first, size = 0, min(self._at_once, _FIRST_AT_ONCE)
         while first < runs:
             started = time.monotonic()
-            yield first, self._evaluate({path: values[first : first + size] for path, values in columns.items()})
+            yield first, self._evaluate(part(first, size))
             # Numbers that follow the varied ones may take longer than the runs, which no estimate knows.
             first, rate = first + size, size / max(time.monotonic() - started, 1.0e-6)
             size = max(1, min(self._at_once, int(_BETWEEN_REPORTS * rate)))
@@ -157,44 +152,60 @@ def scenario_runs(
     threads: int | None = None,
     executor: Executor | None = None,
 ) -> Runs:
-    """Return the runs of a scenario; StudyError for a metric that does not exist or that the scenario cannot have.
+    """Return the runs of a scenario, judged; StudyError for a metric that does not exist or that it cannot have.
 
     Paths in ``gauge`` hold gauge pressures relative to the atmosphere of each run.
     """
-    check_metrics([name for name in metrics if name not in VERDICT_METRICS], scenario)
-
-    evaluate = partial(_rows_of, scenario, tuple(metrics), frozenset(gauge))
+    check_metrics(metrics, scenario)
+    evaluate = partial(run_judged, scenario, tuple(metrics), frozenset(gauge))
     if executor is None:
         evaluate = partial(evaluate, threads, count=counter.count_ended)
     else:
         evaluate = partial(evaluate, threads or 1)
     is_slow = scenario.controller.custom is not None
     at_once = _SLOW_AT_ONCE if is_slow else runs_at_once(scenario, _AT_ONCE)
-    return Runs(evaluate, metrics, counter, at_once, executor)
+    return Runs(evaluate, counter, at_once, executor)
 
 
-def _rows_of(
+def run_judged(
     scenario: Scenario,
     metrics: Sequence[str],
     gauge: Collection[str],
     threads: int | None,
     columns: Mapping[str, Floats],
-    count: Count = report_nothing,
-) -> tuple[Rows, str]:
-    """Return the rows of runs of a scenario, and the reason why the first run failed."""
+    **more: Any,
+) -> Rows:
+    """Run a scenario with values [SI] by path, and return metrics, end and verdict of each run.
+
+    Paths in ``gauge`` hold gauge pressures; ``more`` are further arguments of ``run_ensemble``. Columns are the metrics
+    [SI], nan if a run lacks one, those of ``verdicts``, and:
+
+    - ``failed``, ``status``, ``failure_time``, ``reason``: as in ``EnsembleResult``, the reason None for a good run
+    - ``unusable``: True for a run that failed, or whose command turns too often
+    - ``judged_NAME``: metric to judge by; of a loop that swings, an error at the end is the RMS error, if larger
+    - ``NAME_error``, ``NAME_over_time``: requested errors of metrics, and traces of channels (runs, samples)
+    """
+    needed = [name for name in needed_metrics(scenario) if (kind := metric_kind(name)) and not lacking(scenario, kind)]
     try:
-        result = run_ensemble(scenario, columns, metrics, threads=threads, gauge=gauge, count=count)
+        result = run_ensemble(
+            scenario, columns, tuple(dict.fromkeys((*metrics, *needed))), threads=threads, gauge=gauge, **more
+        )
     except ScenarioError as error:  # its message names the scenario
         raise StudyError(str(error)) from error
-    unknown = np.full(result.status.size, np.nan)
-    values: Rows = {name: result.metrics.get(name, unknown) for name in metrics}
-    reason = result.reasons[min(result.reasons)] if result.reasons else ""
-    return {**values, FAILED: result.status != COMPLETED}, reason
-
-
-def unvaried(scenario: Scenario, runs: int) -> dict[str, Floats]:
-    """Return columns that leave a scenario unchanged, because an ensemble needs at least one column."""
-    return {"supply.pressure": np.full(runs, scenario.device.supply.pressure)}
+    failed, found = result.status != COMPLETED, result.metrics
+    judged = verdicts(found, scenario, columns, gauge)
+    return {
+        **{name: found[name] for name in metrics},
+        **{f"judged_{name}": settled(found, name) for name in metrics},
+        **{f"{name}_error": error for name, error in result.errors.items() if name in metrics},
+        **{f"{name}{OVER_TIME}": trace.T for name, trace in result.traces.items()},
+        **judged,
+        FAILED: failed,
+        "unusable": failed | judged["turning"],
+        "status": result.status,
+        "failure_time": result.failure_time,
+        "reason": np.array([result.reasons.get(run) for run in range(failed.size)], dtype=object),
+    }
 
 
 def joined(parts: Sequence[Rows]) -> Rows:
@@ -202,44 +213,39 @@ def joined(parts: Sequence[Rows]) -> Rows:
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def with_companions(metrics: Sequence[str], scenario: Scenario) -> tuple[str, ...]:
-    """Return the metric names, extended by the metrics that decide whether the scenario follows its reference."""
-    offered = (name for name in needed_metrics(scenario) if (kind := metric_kind(name)) and not lacking(scenario, kind))
-    return tuple(dict.fromkeys((*metrics, *offered)))
+def verdicts(
+    metrics: Mapping[str, Floats], scenario: Scenario, columns: Mapping[str, Floats], gauge: Collection[str] = ()
+) -> Rows:
+    """Return the verdict on each run (runs,), given by its metrics and by its values by path.
 
-
-def excess(
-    rows: Mapping[str, Floats], scenario: Scenario, columns: Mapping[str, Floats], gauge: Collection[str] = ()
-) -> TrackingExcess:
-    """Return the tracking criteria of each run, divided by their limits (runs,).
-
-    ``columns`` are the values of the runs by path; paths in ``gauge`` hold gauge pressures.
+    - ``excess``: largest tracking number over its limit [-]: up to 1 the run follows its reference; nan if unknown
+    - ``off``: excess above 1; 0 if unknown or on purpose
+    - ``follows``, ``oscillates``: 1 or 0, nan if unknown
+    - ``passes``: as ``follows``, 1 also for a run that misses its reference on purpose, which is ``excused``
+    - ``turning``: True where the command alone turns too often
+    - ``beyond_reach``: requested torque that the actuator cannot give [N m]
     """
-    if not set(needed_metrics(scenario)) & set(rows):
-        unknown = np.full(next(iter(rows.values())).size, np.nan)
-        return TrackingExcess(unknown, unknown, np.zeros_like(unknown), unknown > 0.0)
-    varied = {path: column for path, column in absolute(scenario, columns, gauge).items() if path not in TIMES}
-    least = smallest_change(scenario) if scenario.follows_reference else 0.0
-    return tracking_excess(with_numbers(scenario, varied), rows, most_reversals(scenario), least)
+    unknown, most = np.full(len(next(iter(columns.values()))), np.nan), most_reversals(scenario)
+    found, turning = TrackingExcess(unknown, unknown, np.zeros_like(unknown), unknown > 0.0), unknown > 0.0
+    if set(needed_metrics(scenario)) & set(metrics):
+        varied = {path: column for path, column in absolute(scenario, columns, gauge).items() if path not in TIMES}
+        least = smallest_change(scenario) if scenario.follows_reference else 0.0
+        found = tracking_excess(with_numbers(scenario, varied), metrics, most, least)
+        turning = np.asarray(command_turning(scenario, metrics, most) > 1.0)
+    return {
+        "excess": found.largest,
+        # A run whose reference is beyond reach on purpose counts as one that follows.
+        "off": np.where(found.excused, 0.0, np.fmax(found.largest - 1.0, 0.0)),
+        "follows": found.follows,
+        "oscillates": found.oscillates,
+        "passes": found.passes,
+        "excused": found.excused,
+        "turning": turning,
+        "beyond_reach": found.beyond_reach,
+    }
 
 
-def tracking_violation(
-    rows: Mapping[str, Floats], scenario: Scenario, columns: Mapping[str, Floats], gauge: Collection[str] = ()
-) -> Floats:
-    """Return the relative excess of each run over the tracking limits (runs,); 0 if it follows or is unknown.
-
-    A run whose reference is beyond reach on purpose counts as one that follows.
-    """
-    found = excess(rows, scenario, columns, gauge)
-    return np.where(found.excused, 0.0, np.fmax(found.largest - 1.0, 0.0))
-
-
-def oscillating(rows: Mapping[str, Floats], scenario: Scenario) -> NDArray[np.bool_]:
-    """Return flags of oscillating loops (runs,), by the reversals of the command; False for unknown reversals."""
-    return np.asarray(command_turning(scenario, rows, most_reversals(scenario)) > 1.0)
-
-
-def settled(rows: Rows, metric: str) -> Floats:
+def settled(rows: Mapping[str, Floats], metric: str) -> Floats:
     """Return a metric for evaluation; in sustained oscillation, a final error becomes the RMS error, if larger."""
     if metric not in ONE_INSTANT or "settled_turns" not in rows:
         return rows[metric]

@@ -28,29 +28,28 @@ from ppafo.documents.json_text import json_document, json_text, plain
 from ppafo.documents.regular_file import read_regular_file
 from ppafo.documents.toml_text import quote
 from ppafo.engine.lanes import Count, write_source
-from ppafo.errors import DataError, ScenarioError, StudyError, refused_as
+from ppafo.errors import DataError, StudyError, refused_as
 from ppafo.metrics import METRICS
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.recording import CHANNELS
-from ppafo.simulation.ensemble import EnsembleResult, run_ensemble
 from ppafo.simulation.ensemble.columns import absolute
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import scenario_document
 from ppafo.storage.files import LEFT_ASIDE, is_address, write_file
 from ppafo.storage.parquet import (
     TableColumn,
+    as_texts,
     encode_texts,
     lists_of,
     parquet_bytes,
     read_parquet,
     table_of,
-    texts_of_some,
 )
 from ppafo.storage.result_folder import MANIFEST
 from ppafo.studies.distributions import Floats
-from ppafo.studies.study import Study
+from ppafo.studies.study import Configuration, Study
 from ppafo.study.blocks import Chunk, chunks_of, drawn_values, samples_of, varied_columns
-from ppafo.study.runs import excess, unvaried, with_companions
+from ppafo.study.runs import FAILED, OVER_TIME, Rows, run_judged
 from ppafo.version import __version__
 from ppafo.wording import argument_text
 
@@ -66,8 +65,8 @@ _LONGEST_WRITING = 86400.0
 _TRIED_RUNS = 8
 """Number of trial runs of each configuration before a study starts, to detect errors at once."""
 STATUSES = ("completed", "diverged", "refused")
-_PLAIN, _OVER_TIME = "-", "_over_time"
-"""Unit of a dimensionless column, and suffix of the name of a column with a trace."""
+_PLAIN = "-"
+"""Unit of a dimensionless column."""
 OSCILLATES, FOLLOWS, ON_PURPOSE = "oscillates", "follows", "beyond_reach_on_purpose"
 """Names of the columns of flags: the loop of the run oscillates; the run follows its reference."""
 _TEXT_COLUMNS = ("configuration", "status", "reason", "channel")
@@ -213,7 +212,7 @@ class StudyFolder:
             table = read_parquet((self.path / name).open("rb"), name, columns)
             for column in table.schema:
                 kind, is_fit = column.type, pa.types.is_floating(column.type) or pa.types.is_integer(column.type)
-                if column.name.endswith(_OVER_TIME):
+                if column.name.endswith(OVER_TIME):
                     # As many samples in each row, or they are no matrix.
                     is_fit = pa.types.is_list(kind) and pa.types.is_floating(kind.value_type)
                     lengths = table.column(column.name).combine_chunks().value_lengths() if is_fit else ()
@@ -328,8 +327,8 @@ def claim(
         # A few runs of each configuration, spread evenly: a path that cannot vary is refused at once.
         total = study.runs_of_configuration
         runs = np.unique(np.linspace(0, total - 1, min(total, _TRIED_RUNS)).astype(np.int64))
-        for number in range(len(study.configurations)):
-            _result(study, Chunk(0, number, 0, runs.size), drawn_values(study, runs), threads)
+        for configuration in study.configurations:
+            _rows(study, configuration, drawn_values(study, runs), threads)
         folder.write_document(MANIFEST, asked)
     # Abandoned by age and not by process: the folder may be shared by machines that cannot see each other's processes.
     for path in folder.path.rglob(f"*{LEFT_ASIDE}*"):
@@ -382,81 +381,64 @@ def compute_chunk(
     """Compute a chunk; returns the number of its failed runs and its file: a row per run in SI, nan for missing."""
     configuration, outputs = study.configurations[part.configuration], study.outputs
     values = drawn_values(study, np.arange(part.first, part.first + part.runs))
-    result = _result(study, part, values, threads, count)
-    varied = varied_columns(study, configuration, values)
-    judged = excess(result.metrics, configuration.scenario, varied, study.gauge)
-    missing, first = np.full(part.runs, np.nan), part.configuration * study.runs_of_configuration + part.first
-    names = [each.name for each in study.configurations]
-
-    def texts(codes: Any, known: Sequence[str], summary: str) -> TableColumn:
-        return TableColumn(encode_texts(codes, known), _PLAIN, summary)
-
+    rows, varied = _rows(study, configuration, values, threads, count)
+    first = part.configuration * study.runs_of_configuration + part.first
+    names, own = [each.name for each in study.configurations], np.full(part.runs, part.configuration)
     columns = {
-        "run": TableColumn(
-            np.arange(first, first + part.runs, dtype=np.int64), _PLAIN, "number of the run in the study"
-        ),
-        "configuration": texts(np.full(part.runs, part.configuration), names, "name of the base scenario"),
+        "run": (np.arange(first, first + part.runs, dtype=np.int64), _PLAIN, "number of the run in the study"),
+        "configuration": (encode_texts(own, names), _PLAIN, "name of the base scenario"),
     }
     # Gauge pressures as absolute ones, each from the atmosphere of its run.
     in_effect = absolute(configuration.scenario, varied, study.gauge)
     for path, drawn in values.items():
-        shown = in_effect.get(path, drawn) if study.varies(path, configuration.name) else missing
-        columns[path] = TableColumn(shown, study.units[path], "varied value")
+        is_varied = study.varies(path, configuration.name)
+        shown = in_effect.get(path, drawn) if is_varied else np.full(part.runs, np.nan)
+        columns[path] = (shown, study.units[path], "varied value")
     not_known = "where not, empty where that is not known"
+    on_purpose = "1 where it does not, because the reference is beyond reach on purpose"
     columns |= {
-        "status": texts(result.status, STATUSES, "how the run ended"),
-        "failure_time": TableColumn(result.failure_time, "s", "time at which the run diverged"),
-        "reason": TableColumn(texts_of_some(result.reasons, part.runs), _PLAIN, "why the run has no metrics"),
-        OSCILLATES: TableColumn(
-            judged.oscillates, _PLAIN, "1 where the loop oscillates, empty where that is not known"
-        ),
-        FOLLOWS: TableColumn(judged.follows, _PLAIN, f"1 where the run follows its reference, 0 {not_known}"),
-        ON_PURPOSE: TableColumn(
-            judged.excused.astype(float),
-            _PLAIN,
-            "1 where it does not, because the reference is beyond reach on purpose",
-        ),
+        "status": (encode_texts(rows["status"], STATUSES), _PLAIN, "how the run ended"),
+        "failure_time": (rows["failure_time"], "s", "time at which the run diverged"),
+        "reason": (as_texts(rows["reason"]), _PLAIN, "why the run has no metrics"),
+        OSCILLATES: (rows["oscillates"], _PLAIN, "1 where the loop oscillates, empty where that is not known"),
+        FOLLOWS: (rows["follows"], _PLAIN, f"1 where the run follows its reference, 0 {not_known}"),
+        ON_PURPOSE: (rows["excused"].astype(float), _PLAIN, on_purpose),
     }
     for name in outputs.metrics:
-        unit, error = METRICS[name].unit, result.errors.get(name)
-        columns[name] = TableColumn(result.metrics.get(name, missing), stored_unit(unit), METRICS[name].summary)
-        if error is not None:
-            columns[f"{name}_error"] = TableColumn(
-                error, "Pa_d" if unit == "Pa" else unit, f"estimated error of {name}"
-            )
+        unit, error = METRICS[name].unit, f"{name}_error"
+        columns[name] = (rows[name], stored_unit(unit), METRICS[name].summary)
+        if outputs.errors:
+            columns[error] = (rows[error], "Pa_d" if unit == "Pa" else unit, f"estimated error of {name}")
     for channel in outputs.traces:
-        trace = result.traces[channel].T
+        trace = rows[trace_column(channel)]
         trace = trace if trace.size else np.full((part.runs, samples_of(study, configuration)), np.nan)
         # Channels with bands are kept as they were computed, all others in single precision.
         trace = trace.astype(np.float64 if channel in outputs.bands else np.float32)
         summary = f"{CHANNELS[channel].summary}, every {outputs.every:g} s"
-        columns[trace_column(channel)] = TableColumn(lists_of(trace), stored_unit(CHANNELS[channel].unit), summary)
+        columns[trace_column(channel)] = (lists_of(trace), stored_unit(CHANNELS[channel].unit), summary)
     facts = {"study": study.name, "chunk": str(part.number), "rows": str(part.runs), "every": f"{outputs.every!r} s"}
-    return int(np.count_nonzero(result.status)), parquet_bytes(table_of(columns, facts))
+    table = table_of({name: TableColumn(*column) for name, column in columns.items()}, facts)
+    return int(np.count_nonzero(rows[FAILED])), parquet_bytes(table)
 
 
-def _result(
-    study: Study, part: Chunk, values: dict[str, Floats], threads: int | None, count: Count = report_nothing
-) -> EnsembleResult:
-    """Return the results of a chunk with varied ``values`` [SI] by path; StudyError for a path that cannot vary."""
-    configuration, outputs = study.configurations[part.configuration], study.outputs
-    with refused_as(StudyError, f"configuration '{configuration.name}'", ScenarioError):
-        return run_ensemble(
-            configuration.scenario,
-            varied_columns(study, configuration, values) or unvaried(configuration.scenario, part.runs),
-            with_companions(outputs.metrics, configuration.scenario),
-            outputs.traces,
-            outputs.every if outputs.traces else 0.0,
-            threads,
-            study.gauge,
-            outputs.errors,
-            count,
-        )
+def _rows(
+    study: Study,
+    configuration: Configuration,
+    values: dict[str, Floats],
+    threads: int | None,
+    count: Count = report_nothing,
+) -> tuple[Rows, dict[str, Floats]]:
+    """Return rows of a configuration with varied ``values`` [SI], and its columns; StudyError for a fixed path."""
+    outputs, columns = study.outputs, varied_columns(study, configuration, values)
+    kept = {"bands": outputs.traces, "every": outputs.every * bool(outputs.traces), "errors": outputs.errors}
+    with refused_as(StudyError, f"configuration '{configuration.name}'", StudyError):
+        base = configuration.scenario
+        return run_judged(base, outputs.metrics, study.gauge, threads, columns, count=count, **kept), columns
 
 
 def trace_column(channel: str) -> str:
     """Return the name of the column with the trace of a channel."""
-    return f"{channel}{_OVER_TIME}"
+    return f"{channel}{OVER_TIME}"
 
 
 def stored_unit(unit: str) -> str:

@@ -14,12 +14,11 @@ from ppafo.metrics.settled import SettledPart
 from ppafo.parameters.reach import supply_for, torque_reach
 from ppafo.remedy_trials import tried
 from ppafo.running import simulate
-from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.tracking import tracking_in
 from ppafo.simulation.tracking.rule import excess_of_part, failure_of_task, most_reversals
 from ppafo.simulation.tracking.settled import task_parts
-from ppafo.study.runs import excess, with_companions
+from ppafo.study.runs import run_judged
 
 TASK = "torque-task-proportional"
 
@@ -82,8 +81,7 @@ def test_a_walk_that_gives_half_of_the_requested_peak_does_not_follow_and_is_tol
     assert simulate("proportional", [*kept, limit]).tracking.follows
     # A study judges by the request and the limit of each of its runs.
     columns = {"controller.largest_torque": np.array([13.0, 40.0])}
-    metered = run_ensemble(scenario, columns, with_companions([], scenario)).metrics
-    assert excess(metered, scenario, columns).follows.tolist() == [1.0, 0.0]
+    assert run_judged(scenario, (), (), None, columns)["follows"].tolist() == [1.0, 0.0]
 
 
 HELD_DOWN = ["controller.landing_peak_torque=0 N m", "controller.hold_stiffness=1 N m/rad"]
@@ -111,8 +109,7 @@ def test_a_sweep_counts_the_walks_that_follow_by_themselves(
 ) -> None:
     scenario = load_scenario(name, [*changes, "run.duration=6 s"])
     draws = {path: np.array(values) for path, values in columns.items()}
-    metered = run_ensemble(scenario, draws, with_companions([], scenario)).metrics
-    assert excess(metered, scenario, draws).follows.tolist() == follows
+    assert run_judged(scenario, (), (), None, draws)["follows"].tolist() == follows
     walks = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
     assert [tracking_in(simulate(with_numbers(scenario, walked))).follows for walked in walks] == follows
 
@@ -123,7 +120,7 @@ def test_a_run_that_ends_on_its_ramp_is_not_judged_by_its_lag() -> None:
     # Nor where what lies beyond reach is asked for after the end only: runs without a recording have no verdict either.
     base = load_scenario(TASK, ["run.duration=0.3 s"])
     columns = {"supply.pressure": np.array([3.0e5, 4.0e5])}
-    assert np.isnan(excess(run_ensemble(base, columns, with_companions([], base)).metrics, base, columns).follows).all()
+    assert np.isnan(run_judged(base, (), (), None, columns)["follows"]).all()
 
 
 SMALL_SINE = [
@@ -142,8 +139,8 @@ def test_a_limit_cycle_beside_the_reference_oscillates_in_a_run_and_in_a_study()
     alone = [simulate(with_numbers(base, {"reference.level": level})).tracking for level in (3.0, 4.0, 5.0, 6.0)]
     # At 6 N m the valves stay open; at 4 N m the mean error is larger than the swing's standard deviation.
     assert [verdict.kind for verdict in alone] == [*3 * ["oscillates"], ""]
-    metered = excess(run_ensemble(base, columns, with_companions([], base)).metrics, base, columns)
-    assert metered.oscillates.tolist() == [1.0, 1.0, 1.0, 0.0]
+    metered = run_judged(base, (), (), None, columns)
+    assert metered["oscillates"].tolist() == [1.0, 1.0, 1.0, 0.0]
 
 
 KNEE = [
@@ -185,13 +182,12 @@ def test_metered_runs_are_judged_as_their_recordings_are(scenario: str, column: 
     }
     base = load_scenario(*changed.get(scenario, (scenario, [])))
     columns = {column: np.array(values)}
-    metered = run_ensemble(base, columns, with_companions([], base)).metrics
     alone = [simulate(with_numbers(base, {column: value})).tracking for value in values]
-    judged = excess(metered, base, columns)
-    assert (judged.follows == 1.0).tolist() == [verdict.follows for verdict in alone]
-    assert judged.excused.tolist() == [bool(verdict.accepted) for verdict in alone]
+    judged = run_judged(base, (), (), None, columns)
+    assert (judged["follows"] == 1.0).tolist() == [verdict.follows for verdict in alone]
+    assert judged["excused"].tolist() == [bool(verdict.accepted) for verdict in alone]
     if column == "valve.area":
-        assert judged.excused.tolist() == [value > 1.0e-6 for value in values]
+        assert judged["excused"].tolist() == [value > 1.0e-6 for value in values]
 
 
 def test_valves_that_swing_by_more_than_their_limit_do_not_follow_in_a_run_or_an_ensemble() -> None:
@@ -206,8 +202,7 @@ def test_valves_that_swing_by_more_than_their_limit_do_not_follow_in_a_run_or_an
     said = "the torque swings by 1.62 N m (1.2 N m allowed; requested change 2 N m) from 2 s on"
     assert result.tracking.found == said
     assert (result.tracking.number, result.tracking.limit) == pytest.approx((float(np.ptp(error)), 1.2))
-    metered = run_ensemble(base, columns, with_companions([], base)).metrics
-    assert excess(metered, base, columns).follows.tolist() == [0.0, 1.0]
+    assert run_judged(base, (), (), None, columns)["follows"].tolist() == [0.0, 1.0]
     assert simulate(with_numbers(base, {"reference.level": 4.0})).tracking.follows
 
 
@@ -264,7 +259,7 @@ def test_a_judged_part_without_a_peak_gives_no_verdict_and_a_slower_trial_is_lon
     # Metered runs have no verdict either.
     columns = {"reference.amplitude": np.array([4.0, 9.0])}
     base = load_scenario(TASK, changes)
-    judged = excess(run_ensemble(base, columns, with_companions([], base)).metrics, base, columns).follows
+    judged = run_judged(base, (), (), None, columns)["follows"]
     assert np.isnan(judged[0])
     assert judged[1] == 0.0
     late = load_scenario("cylinder-servo", LATE_SINE)
@@ -473,12 +468,10 @@ def test_a_table_is_judged_by_its_pulses_and_not_by_its_last_rest(duration: str)
     base = load_scenario("torque-task-solenoid", task)
     columns = {"sensors.delay": np.array([0.0])}
     assert simulate(base).tracking.fails
-    metered = run_ensemble(base, columns, with_companions([], base)).metrics
-    assert excess(metered, base, columns).follows.tolist() == [0.0]
+    assert run_judged(base, (), (), None, columns)["follows"].tolist() == [0.0]
     once = load_scenario("torque-task-solenoid", [text.replace("=1.25 s", "=9 s") for text in task])
     assert (simulate(once).tracking.since, simulate(once).tracking.until) == (0.0, 0.6)
-    metered = run_ensemble(once, columns, with_companions([], once)).metrics
-    assert excess(metered, once, columns).follows.tolist() == [0.0]
+    assert run_judged(once, (), (), None, columns)["follows"].tolist() == [0.0]
 
 
 WAVE = ["reference.kind=sine", "reference.level=0 N m", "reference.frequency=0.2 Hz", *QUICK]

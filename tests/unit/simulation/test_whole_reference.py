@@ -11,12 +11,11 @@ import ppafo
 from ppafo.cli.main import main
 from ppafo.loading import load_scenario
 from ppafo.metrics.metric import followed
-from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
-from ppafo.simulation.tracking.rule import excess_of_part, part_limits
+from ppafo.simulation.tracking.rule import excess_of_part, needed_metrics, part_limits
 from ppafo.simulation.tracking.settled import settled_parts, smallest_change, task_parts
-from ppafo.study.runs import excess, with_companions
+from ppafo.study.runs import run_judged
 
 TASK = "torque-task-proportional"
 SMALL_WAVE = [f"reference.{text}" for text in ("kind=sine", "level=3 N m", "amplitude=0.6 N m", "frequency=4 Hz")]
@@ -61,8 +60,8 @@ def test_every_rest_and_move_is_judged_and_equally_in_runs_and_in_studies(
     assert result.tracking.follows is (not said)
     assert result.tracking.sentence.startswith(said)
     columns = {"supply.pressure": np.full(1, scenario.device.supply.pressure)}
-    rows = run_ensemble(scenario, columns, with_companions([], scenario)).metrics
-    assert (excess(rows, scenario, columns).follows == 1.0).tolist() == [not said]
+    rows = run_judged(scenario, needed_metrics(scenario), (), None, columns)
+    assert (rows["follows"] == 1.0).tolist() == [not said]
     metered = settled_parts(scenario, rows, smallest_change(scenario))
     parts = task_parts(scenario, result.recording)
     monkeypatch.setenv("PPAFO_BACKEND", "python")
@@ -167,7 +166,7 @@ def test_a_walk_with_on_off_valves_is_judged_by_what_it_gives_in_push_off() -> N
     assert lacking.tracking.criterion == "missing peak torque"
     base = load_scenario("solenoid", ["run.duration=6 s"])
     columns = {"valve.area": np.array([12.6e-6, 1.0e-6])}
-    assert excess(run_ensemble(base, columns, with_companions([], base)).metrics, base, columns).follows.tolist() == [
+    assert run_judged(base, (), (), None, columns)["follows"].tolist() == [
         1,
         0,
     ]

@@ -9,12 +9,12 @@ from ppafo.errors import DataError
 from ppafo.storage.parquet import (
     TableColumn,
     as_numpy,
+    as_texts,
     encode_texts,
     lists_of,
     parquet_bytes,
     read_parquet,
     table_of,
-    texts_of_some,
 )
 
 
@@ -25,7 +25,7 @@ def content() -> bytes:
         "run": TableColumn(np.arange(500), "-", "number"),
         "torque": TableColumn(random.normal(size=500), "N m", "a torque"),
         "status": TableColumn(encode_texts(np.arange(500) % 2, ("good", "bad")), "-", "how it ended"),
-        "reason": TableColumn(texts_of_some({3: "why"}, 500), "-", "why"),
+        "reason": TableColumn(as_texts([*[None] * 3, "why", *[None] * 496]), "-", "why"),
         "trace": TableColumn(lists_of(random.normal(size=(500, 4)).astype(np.float32)), "N m", "over time"),
     }
     return parquet_bytes(table_of(columns, {"study": "mine"}))

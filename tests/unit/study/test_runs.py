@@ -11,7 +11,7 @@ from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import Floats
-from ppafo.study.runs import FAILED, RunCounter, Runs, excess, scenario_runs, settled, with_companions
+from ppafo.study.runs import FAILED, RunCounter, Runs, scenario_runs, settled
 from tests.model_runs import model_runs
 
 SHORT = ("run.duration=0.2 s",)
@@ -37,10 +37,10 @@ def test_a_run_of_a_study_oscillates_where_it_does_alone() -> None:
     changes = ["reference.level=4 N m", "supply.pressure=80 psi_g", "controller.dead_band=0"]
     changes += ["controller.proportional_gain=0.5 1/(N m)", "controller.integral_gain=1 1/(N m s)"]
     scenario, columns = load_scenario(task, changes), {"sensors.delay": np.array([0.0, 20e-3, 40e-3])}
-    rows = scenario_runs(scenario, with_companions(["rms_error"], scenario), RunCounter(3, None)).run(columns)
+    rows = scenario_runs(scenario, ["rms_error"], RunCounter(3, None)).run(columns)
     alone = [simulate(task, [*changes, f"sensors.delay={delay:g} s"]).tracking for delay in columns["sensors.delay"]]
     assert [verdict.kind for verdict in alone] == ["", "oscillates", "oscillates"]
-    assert excess(rows, scenario, columns).oscillates.tolist() == [0.0, 1.0, 1.0]
+    assert rows["oscillates"].tolist() == [0.0, 1.0, 1.0]
 
 
 def test_a_run_that_is_refused_is_a_failure_with_its_reason() -> None:

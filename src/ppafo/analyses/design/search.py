@@ -37,10 +37,10 @@ from ppafo.simulation.motion_kind import LawSignals
 from ppafo.simulation.numbers import NOISE_SEED, number_at, with_numbers
 from ppafo.simulation.simulate import simulate
 from ppafo.simulation.torque_loop import LoopParts
-from ppafo.simulation.tracking import REVERSALS
+from ppafo.simulation.tracking import REVERSALS, most_reversals
+from ppafo.simulation.tracking.rule import command_turning
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.studies.draws import seeds_of_noise
-from ppafo.study.runs import oscillating
 from ppafo.units.shown import in_units
 from ppafo.version import __version__
 from ppafo.walking.bottle.coupling import Schedule
@@ -232,7 +232,7 @@ class Trials:
             # The error limit of the design judges the tracking: no other tracking metric is needed.
             result = run_ensemble(scenario, tiled, (ERROR, GAS, REVERSALS), threads=self._threads)
             # A loop that oscillates is no design, whatever its error is.
-            oscillates = oscillating(result.metrics, scenario)
+            oscillates = command_turning(scenario, result.metrics, most_reversals(scenario)) > 1.0
             error[:, rows] = np.where(oscillates, np.nan, result.metrics[ERROR]).reshape(streams, -1)
             gas[:, rows] = np.where(oscillates, np.nan, result.metrics[GAS]).reshape(streams, -1)
             self.runs += oscillates.size

@@ -31,7 +31,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import Uncertainty, replicate_seed
 from ppafo.studies.intervals import jackknife_reach
-from ppafo.study.runs import Runs, tracking_violation
+from ppafo.study.runs import Runs
 from ppafo.wording import argument_text
 
 if TYPE_CHECKING:
@@ -348,11 +348,11 @@ def analyse(
     maximum_failed: float = 0.02,
     study: str = "",
     scenario: Scenario | None = None,
-    metrics: Sequence[str] = (),
+    metrics: Sequence[str],
 ) -> Influences:
     """Return the sensitivity indices of metrics.
 
-    ``scenario`` is the scenario of the runs, None for a model; ``metrics`` are the metrics to analyse, () for all.
+    ``scenario`` is the scenario of the runs, None for a model.
     Raises StudyError for invalid settings, dependent values or too many failures.
     """
     if uncertainty.scores is not None and method is SOBOL:
@@ -367,9 +367,8 @@ def analyse(
     # Checked before anything runs: a design takes thousands of runs.
     columns = uncertainty.columns(method.design(uncertainty, samples, seed))
     rows = runs.run(columns)
-    requested = tuple(metrics) or runs.metrics
-    runs.check(rows, maximum_failed, "sensitivity", requested)
-    values = {name: rows[name] for name in requested}
+    runs.check(rows, maximum_failed, "sensitivity", metrics)
+    values = {name: rows[name] for name in metrics}
     constant = {name: float(np.nanmin(each)) for name, each in values.items() if np.nanmin(each) == np.nanmax(each)}
     if len(constant) == len(values):
         said = ", ".join(f"'{name}' is {number:g}" for name, number in constant.items())
@@ -379,7 +378,6 @@ def analyse(
         # A seed has no order: from its 5 to its 95 % quantile nothing changes.
         ends = number.distribution.values(np.array(_ENDS)) * (np.nan if number.path == NOISE_SEED else 1.0)
         inputs.append((columns[number.path].reshape(samples, -1), ends))
-    off = 0 if scenario is None else np.count_nonzero(tracking_violation(rows, scenario, columns, uncertainty.gauge))
     return Influences(
         study=study,
         method=method.name,
@@ -391,7 +389,7 @@ def analyse(
         paths=list(uncertainty.paths),
         runs=runs.count,
         failed=runs.failures,
-        not_following=int(off),
+        not_following=int(np.count_nonzero(rows["off"])),
         metrics=[
             _metric_sensitivity(name, each.reshape(samples, -1), inputs, method, seed, confidence)
             for name, each in values.items()

@@ -92,7 +92,7 @@ def sensitivity(
     from ppafo.analyses.sensitivity.methods import DEFAULT_SAMPLES, METHODS, analyse, finding_of
     from ppafo.studies.draws import drawn_in
     from ppafo.study.executing import executor_of
-    from ppafo.study.runs import RunCounter, scenario_runs, with_companions
+    from ppafo.study.runs import RunCounter, scenario_runs
 
     if method is not None and method not in METHODS:
         raise StudyError(f"there is no method '{method}'{known_names(method, METHODS)}")
@@ -104,8 +104,7 @@ def sensitivity(
         raise StudyError(f"the outputs of study '{chosen.name}' have no metric; name the metric to analyse")
     count = DEFAULT_SAMPLES[by.name] if samples is None else samples
     tally = RunCounter(count * by.block_rows(len(used.drawn)), progress)
-    companions = with_companions(requested, base.scenario)
-    runs = scenario_runs(base.scenario, companions, tally, used.gauge, threads, executor_of(executor))
+    runs = scenario_runs(base.scenario, requested, tally, used.gauge, threads, executor_of(executor))
     with shown_in(chosen.shown_for(base.scenario)):
         found = analyse(
             runs,

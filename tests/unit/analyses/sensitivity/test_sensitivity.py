@@ -26,7 +26,7 @@ ANGLES = Uncertainty(
 
 def analysed(model: Model, uncertainty: Uncertainty, method: str, samples: int, **more: Any) -> Influences:
     """What comes of a formula in place of a simulation."""
-    return analyse(model_runs(model, [METRIC]), uncertainty, METHODS[method], samples, **more)
+    return analyse(model_runs(model, [METRIC]), uncertainty, METHODS[method], samples, metrics=[METRIC], **more)
 
 
 def ishigami(columns: Mapping[str, Floats]) -> dict[str, Floats]:
