@@ -42,7 +42,18 @@ def declared(document: Mapping[str, Any]) -> dict[str, Field]:
 
     Raises KindError for a controller that cannot be loaded, and for a motion that is no walk.
     """
-    _check_motion(kind_at(document, "motion"))
+    motion = kind_at(document, "motion")
+    if motion in VANE_MOTIONS:
+        raise KindError(
+            f"motion.kind = {quote(motion)}: a walk file needs motion.kind = '{WALK}'; simulate other scenarios with "
+            "'ppafo simulate' and, for OpenSim, give 'ppafo export opensim' the result folder"
+        )
+    with refused_as(KindError, f"motion.kind = {quote(motion)}", KindError):
+        is_known = not motion or is_walk(motion)
+    if not is_known:
+        # The motions of a vane are named too: the file may be meant for one.
+        hint = nearest_kind(motion, tuple(MOTIONS), MotionKind)
+        raise KindError(f"motion.kind = {quote(motion)} is not known{hint}; allowed: {', '.join(MOTIONS)}")
     with refused_as(KindError, "controller.kind", KindError):
         load_walking_controller(kind_at(document, "controller"))
     laws = walking_controllers()
@@ -75,21 +86,6 @@ def declared(document: Mapping[str, Any]) -> dict[str, Field]:
 def _optional(section: str, quantities: Iterable[Quantity]) -> dict[str, Quantity]:
     """Return numbers that a file may omit."""
     return numbers(section, (replace(quantity, optional=True) for quantity in quantities))
-
-
-def _check_motion(kind: str) -> None:
-    """Raise KindError for a motion that is no walk."""
-    if kind in VANE_MOTIONS:
-        raise KindError(
-            f"motion.kind = {quote(kind)}: a walk file needs motion.kind = '{WALK}'; simulate other scenarios with "
-            "'ppafo simulate' and, for OpenSim, give 'ppafo export opensim' the result folder"
-        )
-    with refused_as(KindError, f"motion.kind = {quote(kind)}", KindError):
-        is_known = not kind or is_walk(kind)
-    if not is_known:
-        # The motions of a vane are named too: the file may be meant for one.
-        hint = nearest_kind(kind, tuple(MOTIONS), MotionKind)
-        raise KindError(f"motion.kind = {quote(kind)} is not known{hint}; allowed: {', '.join(MOTIONS)}")
 
 
 OF_A_WALK = Content(

@@ -13,7 +13,6 @@ from ppafo.metrics.metric import MetricKind, Metrics
 from ppafo.metrics.strides import SETTLING
 from ppafo.model.contact import SWING
 from ppafo.model.leg import LegParameters, passive_torque, torque_on_knee
-from ppafo.model.plant import PlantParameters
 from ppafo.signals import Recording
 from ppafo.signals.meter import LED_SHANK, REQUESTED
 from ppafo.simulation.contradictions import check_no_bottle
@@ -73,7 +72,14 @@ def recording_of_walk(
     """Return the recording of a walk [SI] from its rows (samples,) by path at times [s]; ``supply`` is its bottle."""
     walk, gait = run.walk, walk_of(scenario).gait
     assert walk is not None, "a walk has a leg"
-    plant = run.plant if supply is None else _plant_on_bottle(run, time, supply)
+    plant = run.plant
+    if supply is not None:
+        # The gas of the bottle has one temperature between two exchanges with the device.
+        exchanges = np.searchsorted(supply.times, time + 1.0e-9 * run.step, side="right") - 1
+        latest = np.minimum(np.maximum(exchanges, 0), supply.times.size - 2)
+        temperature = supply.values["gas_temperature"]
+        gas_product: Any = plant.gas_product * (temperature / temperature[0])[latest]
+        plant = plant._replace(gas_product=gas_product)
     path = ankle_path(gait, walk.timing, walk_of(scenario).wearer)
     angle, rate, external = (record[row] for row in ("state.angle", "state.angular_velocity", "walk.external_torque"))
     channels = device_channels(scenario.device.gas, replace(run, plant=plant), record)
@@ -100,18 +106,6 @@ def recording_of_walk(
     if _REQUEST_ROW in record:
         channels["reference"] = (record[_REQUEST_ROW], "N m")
     return recording_of(f"walk, {scenario.name}", run, time, channels)
-
-
-def _plant_on_bottle(run: Run, time: Floats, supply: SupplyCourse) -> PlantParameters:
-    """Return the plant with the gas product R T [J/kg] at each time [s], for the gas temperature of the bottle.
-
-    The temperature is constant between two exchanges of bottle and device.
-    """
-    exchanges = np.searchsorted(supply.times, time + 1.0e-9 * run.step, side="right") - 1
-    latest = np.minimum(np.maximum(exchanges, 0), supply.times.size - 2)
-    temperature = supply.values["gas_temperature"]
-    gas_product: Any = run.plant.gas_product * (temperature / temperature[0])[latest]
-    return run.plant._replace(gas_product=gas_product)
 
 
 def result_of_walk(scenario: Scenario, run: Run, outcome: BatchResult, supply: SupplyCourse | None) -> WalkResult:

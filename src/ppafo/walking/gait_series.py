@@ -155,12 +155,9 @@ class AnklePath:
 
     def toe_height(self, phase: Floats, shank: Floats, ankle: Floats) -> Floats:
         """Return the toe clearance above the ground [m] at phases from 0 to 1; negative if the toes would drag."""
-        return np.asarray(np.interp(phase % 1.0, _GRID, self.up) + self.toes_over_ankle(shank, ankle))
-
-    def toes_over_ankle(self, shank: Floats, ankle: Floats) -> Floats:
-        """Return the height of the toes relative to the ankle [m], negative for a flat foot."""
         tilt = shank - ankle + 0.5 * np.pi - self.ground_angle
-        return np.asarray(self.toe_lever * np.sin(tilt) - self.height * np.cos(tilt))
+        over_ankle = self.toe_lever * np.sin(tilt) - self.height * np.cos(tilt)
+        return np.asarray(np.interp(phase % 1.0, _GRID, self.up) + over_ankle)
 
     def _sole(self, tilt: Floats, lever: float) -> Floats:
         along, up = np.cos(tilt), np.sin(tilt)

@@ -29,15 +29,8 @@ from ppafo.simulation.loading import Layout, list_scenarios, request_again, requ
 from ppafo.simulation.motion_kind import WALK
 from ppafo.simulation.overrides import OverriddenDocument, over_layer
 from ppafo.simulation.scenario import Assumption, Control, Initial, RunSettings, Scenario, Sensors
-from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
-from ppafo.walking.declaration import (
-    DURATION,
-    FORCES,
-    OF_A_WALK,
-    SEED,
-    STEP,
-    WALK_SENSORS,
-)
+from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, read_bottle
+from ppafo.walking.declaration import DURATION, FORCES, OF_A_WALK, SEED, STEP, WALK_SENSORS
 from ppafo.walking.motion import WalkMotion, duration_problems, record_interval, walk_of, with_duration
 from ppafo.walking.planning import NO_REFERENCE
 from ppafo.walking.wearer import links_of_stature, read_wearer, wearer_origin
@@ -74,10 +67,26 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     if line is not None and bottle is not None:
         line = bottle.fed(line)
     sensors = reading.section("sensors", WALK_SENSORS)
-    motion = _motion(reading, request, bottle, sensors)
+    name, is_named = document.get("gait", NORMATIVE), "gait" in document
+    # A relative path starts in the folder of the document.
+    with refused_as(DataError, reading.quote("gait"), DataError):
+        gait = load_gait(request.folder / name if Path(name).suffix == ".toml" else name)
+    motion = WalkMotion(
+        kind=kind_at(document, "motion") or WALK,
+        gait=gait,
+        wearer=read_wearer(reading, gait, is_named),
+        forces={name: sensors[name] for name in FORCES},
+        bottle=bottle,
+        wearer_origin=wearer_origin(reading, gait, is_named),
+    )
     step = reading.number("run.step", STEP)
     kind = kind_at(document, "controller")
     law = walking_controllers()[kind]
+    assumptions = {
+        path: Assumption(path, "" if value_at(document, path) is None else str(value_at(document, path)), note)
+        for path, note in (document.get("assumed", {}) | ({} if bottle is None else bottle.assumed)).items()
+    }
+    assumptions |= {line.path: replace(line, note=f"{line.value}, {line.note}") for line in assumed_lines(reading)}
     atmosphere = device.supply.atmospheric_pressure
     scenario = Scenario(
         name=document["name"],
@@ -93,7 +102,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
             **{name: number for name, number in sensors.items() if name not in FORCES},
             seed=int(reading.number("sensors.seed", SEED)),
         ),
-        assumptions=_assumed(reading, bottle),
+        assumptions=tuple(assumptions.values()),
         origin=origin_of(request, changed, hardware),
         gas_model=read_gas_model(reading),
         supply_line=line,
@@ -109,40 +118,6 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         if is_bad:
             raise ScenarioError(f"{reading.file}: {problem(0)}")
     return with_duration(scenario, duration)
-
-
-def _motion(
-    reading: DocumentReader,
-    request: ScenarioRequest,
-    bottle: BottleSupply | None,
-    sensors: Mapping[str, float],
-) -> WalkMotion:
-    """Return the motion of a walk: wearer, gait, tasks, bottle; ``sensors`` are the sensor settings [SI]."""
-    name = reading.document.get("gait", NORMATIVE)
-    # A relative path starts in the folder of the document.
-    with refused_as(DataError, reading.quote("gait"), DataError):
-        gait = load_gait(request.folder / name if Path(name).suffix == ".toml" else name)
-    is_named = "gait" in reading.document
-    return WalkMotion(
-        kind=kind_at(reading.document, "motion") or WALK,
-        gait=gait,
-        wearer=read_wearer(reading, gait, is_named),
-        forces={name: sensors[name] for name in FORCES},
-        bottle=bottle,
-        wearer_origin=wearer_origin(reading, gait, is_named),
-    )
-
-
-def _assumed(reading: DocumentReader, bottle: BottleSupply | None) -> tuple[Assumption, ...]:
-    """Return the assumptions of a walk: from its file, its supply lines and its bottle."""
-    notes = reading.document.get("assumed", {}) | ({} if bottle is None else bottle.assumed)
-    assumptions = {}
-    for path, note in notes.items():
-        value = value_at(reading.document, path)
-        assumptions[path] = Assumption(path, "" if value is None else str(value), note)
-    for line in assumed_lines(reading):
-        assumptions[line.path] = replace(line, note=f"{line.value}, {line.note}")
-    return tuple(assumptions.values())
 
 
 WALKING = Layout(FILE, OF_A_WALK, build_walk)

@@ -71,31 +71,7 @@ def walk_metrics(
     ``starts`` are the samples after each heel strike. Means leave out the first strides, in which the controller
     adapts, as ``averages`` do.
     """
-    gas = float(np.ptp(recording["supplied_mass"][[0, -1]]))
-    metrics = _stride_metrics(configuration, strides, averages) | {
-        "strides": Metric(float(strides["gas"].size), "-", "whole strides of the walk"),
-        "total_gas": Metric(gas, "kg", "gas taken from the supply in the whole walk"),
-    }
-    of_torque: dict[str, float] = {}
-    if "reference" in recording:
-        reference, requested = recording["reference"], requested_samples(recording)
-        error = reference - recording["torque"]
-        # A controller that requests a torque is judged by how well it gets it in push-off.
-        settled = slice(*starts[[SETTLING, -1]]) if starts.size > SETTLING else slice(0)
-        pushes = recording["controller_phase"][settled] == PUSH_OFF
-        parts = {"push_off_error": error[settled][pushes], "torque_error": error[requested]}
-        parts["requested_torque"] = reference[requested]
-        of_torque = {name: float(np.sqrt(np.mean(part**2))) for name, part in parts.items() if part.size}
-    of_torque |= {"peak_torque": peak_torque(recording), "command_reversals": command_reversals(recording)}
-    metrics |= {name: Metric(value, METRICS[name].unit, METRICS[name].summary) for name, value in of_torque.items()}
-    return metrics
-
-
-def _stride_metrics(
-    configuration: Scenario, strides: Mapping[str, Floats], averages: Mapping[str, Curves]
-) -> dict[str, Metric]:
-    """Return means over the strides after the first ones, and their ratios to a healthy ankle."""
-    metrics = {}
+    metrics: dict[str, Metric] = {}
     for name, quantity in PER_STRIDE.items():
         values = strides[name][SETTLING:]
         if values.size:
@@ -122,6 +98,21 @@ def _stride_metrics(
         away = averages["angle"].mean - averages["healthy_angle"].mean
         summary = "RMS difference of the mean ankle angle to the healthy one"
         metrics["angle_difference"] = Metric(float(np.sqrt(np.mean(away**2))), "rad", summary)
+    gas = float(np.ptp(recording["supplied_mass"][[0, -1]]))
+    metrics["strides"] = Metric(float(strides["gas"].size), "-", "whole strides of the walk")
+    metrics["total_gas"] = Metric(gas, "kg", "gas taken from the supply in the whole walk")
+    of_torque: dict[str, float] = {}
+    if "reference" in recording:
+        reference, requested = recording["reference"], requested_samples(recording)
+        error = reference - recording["torque"]
+        # A controller that requests a torque is judged by how well it gets it in push-off.
+        settled = slice(*starts[[SETTLING, -1]]) if starts.size > SETTLING else slice(0)
+        pushes = recording["controller_phase"][settled] == PUSH_OFF
+        parts = {"push_off_error": error[settled][pushes], "torque_error": error[requested]}
+        parts["requested_torque"] = reference[requested]
+        of_torque = {name: float(np.sqrt(np.mean(part**2))) for name, part in parts.items() if part.size}
+    of_torque |= {"peak_torque": peak_torque(recording), "command_reversals": command_reversals(recording)}
+    metrics |= {name: Metric(value, METRICS[name].unit, METRICS[name].summary) for name, value in of_torque.items()}
     return metrics
 
 

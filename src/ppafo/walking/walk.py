@@ -10,8 +10,8 @@ import numpy as np
 
 from ppafo.arguments import Minutes, Overrides, checked
 from ppafo.control.walking import event_on_off
-from ppafo.engine.lanes import STEPS_PER_CALL, BatchResult, begin_block, effort_for
-from ppafo.engine.run import Run, batch_of
+from ppafo.engine.lanes import STEPS_PER_CALL, begin_block, effort_for
+from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.metrics import Metric
 from ppafo.model.leg import passive_torque
@@ -24,8 +24,8 @@ from ppafo.simulation.numbers import check_parts
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.python_controller import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
-from ppafo.walking.bottle.coupling import BottleLife, Schedule, life_on_bottle, run_on_bottle
-from ppafo.walking.bottle.course import WALKED
+from ppafo.walking.bottle.coupling import Schedule, walk_on_bottle
+from ppafo.walking.bottle.course import WALKED, SupplyCourse
 from ppafo.walking.evaluation import result_of_walk
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import SHORTEST_STRIDES, duration_problems, walk_of, with_duration
@@ -99,23 +99,19 @@ def walk(
         check_no_bottle(scenario)
         return result_of_walk(scenario, run, run_sampled(batch_of(run), custom), None)
     if motion.bottle is None:
-        return result_of_walk(scenario, run, _simulated(run, progress), None)
-    rows, supply = run_on_bottle(run, fed_device(scenario), motion.bottle, motion.gait.stride_time, progress)
+        # In parts short enough for interrupts and progress reports.
+        batch, steps = batch_of(run), run.step_count
+        block = begin_block(batch, effort_for(batch))
+        for done in range(0, steps, STEPS_PER_CALL):
+            block.advance(min(STEPS_PER_CALL, steps - done))
+            progress(min(done + STEPS_PER_CALL, steps) * run.step / 60.0, steps * run.step / 60.0)
+        return result_of_walk(scenario, run, block.result(), None)
+    rows, supply = walk_on_bottle(run, fed_device(scenario), motion.bottle, motion.gait.stride_time, progress)
     return result_of_walk(scenario, run, rows, supply)
 
 
-def _simulated(run: Run, progress: Progress) -> BatchResult:
-    """Return states and records of a walk, run in parts short enough for interrupts and progress reports."""
-    batch, steps = batch_of(run), run.step_count
-    block = begin_block(batch, effort_for(batch))
-    for done in range(0, steps, STEPS_PER_CALL):
-        block.advance(min(STEPS_PER_CALL, steps - done))
-        progress(min(done + STEPS_PER_CALL, steps) * run.step / 60.0, steps * run.step / 60.0)
-    return block.result()
-
-
-def bottle_life(scenario: Scenario, schedule: Schedule) -> BottleLife:
-    """Walk on the scenario's bottle until the bottle is exhausted; return the time that it lasted.
+def bottle_life(scenario: Scenario, schedule: Schedule) -> SupplyCourse:
+    """Walk on the scenario's bottle until the bottle is exhausted; return the supply over time.
 
     The simulation is as in ``walk``, with the rests and the longest duration of ``schedule``. Raises ScenarioError for
     a walk without a bottle.
@@ -132,7 +128,7 @@ def bottle_life(scenario: Scenario, schedule: Schedule) -> BottleLife:
     seconds = min(math.ceil(schedule.longest / stride_time) * stride_time, seconds_of_run)
     repeated = replace(minute, run=replace(minute.run, duration=60.0 * max(1, round(seconds / 60.0))))
     run, device = plan_run(repeated), fed_device(repeated)
-    return life_on_bottle(run, device, motion.bottle, stride_time, schedule, silent)
+    return walk_on_bottle(run, device, motion.bottle, stride_time, silent, schedule)[1]
 
 
 def lasting(scenario: Scenario, minutes: float | None) -> Scenario:

@@ -398,11 +398,11 @@ def on_walk(
     walking = on_bottle(scenario, bottle, overrides)
     supply = walk_of(walking).bottle
     assert supply is not None, "a walk on a bottle"
-    life = bottle_life(walking, schedule)
-    course, end = life.course, life.course.ending
+    course = bottle_life(walking, schedule)
+    end, walked = course.ending, course.walked / walk_of(walking).gait.stride_time
     # A bottle may end before the first stride does.
-    strides = max(life.strides, 1.0e-9)
-    stride_time, mass = life.walked / strides, course.regulated / strides
+    strides = max(walked, 1.0e-9)
+    stride_time, mass = course.walked / strides, course.regulated / strides
     # An open valve may let gas back into the supply for moments, so the largest flow is a mean over 0.1 s.
     peak = max(largest_flow(recording), gas / walk_of(scenario).gait.stride_time, mass / stride_time)
     # A walk goes on below the pressure that its regulator needs, as long as the torque suffices: warm as cold.
@@ -416,9 +416,9 @@ def on_walk(
         stride_time=stride_time,
         mean_flow=mass / stride_time,
         peak_flow=peak,
-        walking_time=life.walked,
-        total_time=life.total,
-        strides=life.strides,
+        walking_time=course.walked,
+        total_time=course.walked + course.rested,
+        strides=walked,
         strides_when_warm=(supply.mass - smallest_mass_when_warm(supply.bottle, peak, lowest)) / mass,
         ending=TIME_IS_UP if end.kind == WALKED else end.kind,
         message=end.message,

@@ -63,51 +63,27 @@ class Schedule(NamedTuple):
     longest: float
 
 
-@dataclass(frozen=True, slots=True)
-class BottleLife:
-    """State of a bottle from the start of a walk until the bottle ends it.
-
-    ``course`` is the state of the supply over time, ``walked`` the walking time [s], ``total`` the walking time plus
-    the rests [s], and ``strides`` the number of strides that were walked.
-    """
-
-    course: SupplyCourse
-    walked: float
-    total: float
-    strides: float
-
-
-def run_on_bottle(
-    run: Run, device: Device, supply: BottleSupply, stride_time: float, progress: Callable[[float, float], None]
-) -> tuple[BatchResult, SupplyCourse]:
-    """Simulate a walk on a bottle until either ends; return states and records of the walk, and the supply over time.
-
-    ``device`` is the device for which the run was planned, ``stride_time`` the duration of a stride [s]. ``progress``
-    is called with the minutes simulated and the total number of minutes.
-    """
-    use = _BottleInUse([_Meeting(0.0, supply.start(), supply.offers_first())])
-    result, done = _use_bottle(run, device, supply, stride_time, use, progress)
-    count = batch_of(run).clock.step_count
-    record = result.record if done == count else result.record[: (done - 1) // int(run.record_every) + 1]
-    return BatchResult(result.states, record), _course_of_use(supply, use)
-
-
-def life_on_bottle(
+def walk_on_bottle(
     run: Run,
     device: Device,
     supply: BottleSupply,
     stride_time: float,
-    schedule: Schedule,
     progress: Callable[[float, float], None],
-) -> BottleLife:
-    """Walk until the bottle is exhausted, with the rests of the schedule.
+    schedule: Schedule | None = None,
+) -> tuple[BatchResult, SupplyCourse]:
+    """Simulate a walk on a bottle until either ends; return states and records of the walk, and the supply over time.
 
-    The run is planned for the longest possible walk. ``progress`` is called as in ``run_on_bottle``.
+    ``device`` is the device for which the run was planned, ``stride_time`` the duration of a stride [s]. With a
+    schedule, the walk has its rests, and is repeated until the bottle is exhausted or the schedule over. ``progress``
+    is called with the minutes simulated and the total number of minutes.
     """
     use = _BottleInUse([_Meeting(0.0, supply.start(), supply.offers_first())])
-    while use.ending is None and use.walked + use.rested < schedule.longest:
-        _use_bottle(run, device, supply, stride_time, use, progress, schedule)
-    return BottleLife(_course_of_use(supply, use), use.walked, use.walked + use.rested, use.walked / stride_time)
+    result, done = _use_bottle(run, device, supply, stride_time, use, progress, schedule)
+    while schedule is not None and use.ending is None and use.walked + use.rested < schedule.longest:
+        result, done = _use_bottle(run, device, supply, stride_time, use, progress, schedule)
+    is_whole = done == batch_of(run).clock.step_count
+    record = result.record if is_whole else result.record[: (done - 1) // int(run.record_every) + 1]
+    return BatchResult(result.states, record), _course_of_use(supply, use)
 
 
 class _Meeting(NamedTuple):
@@ -160,6 +136,8 @@ def _course_of_use(supply: BottleSupply, use: _BottleInUse) -> SupplyCourse:
         first=use.met[0].state,
         last=last.state,
         regulated=use.regulated,
+        walked=use.walked,
+        rested=use.rested,
         ending=use.ending or SupplyEnding(WALKED, over, last.time),
     )
 
@@ -171,7 +149,7 @@ def _use_bottle(
     stride_time: float,
     use: _BottleInUse,
     progress: Callable[[float, float], None],
-    schedule: Schedule | None = None,
+    schedule: Schedule | None,
 ) -> tuple[BatchResult, int]:
     """Simulate a run on a bottle and update ``use`` in place; return the rows of the run and the number of steps."""
     batch = batch_of(run)

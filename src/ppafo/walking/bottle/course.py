@@ -64,7 +64,7 @@ class SupplyCourse:
 
     ``times`` [s] (n,) are the times of data exchange between bottle and device, ``values`` (n,) the series by name, in
     the units of ``UNITS``. ``first`` and ``last`` are the states at the start and at the end, ``regulated`` is the gas
-    through the regulator [kg].
+    through the regulator [kg], ``walked`` and ``rested`` are the times of walking and of rests [s].
     """
 
     supply: BottleSupply
@@ -73,6 +73,8 @@ class SupplyCourse:
     first: SupplyState
     last: SupplyState
     regulated: float
+    walked: float
+    rested: float
     ending: SupplyEnding
 
     @property

@@ -141,14 +141,16 @@ def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> Bottle
         path = Path(name)
         is_file = path.suffix == ".toml" and not path.is_absolute()
         bottle = load_bottle(folder / path if is_file else name, own)
-    pressure, own_pressure = device.supply.pressure, other_pressure(path, bottle, device)
+    pressure, room = device.supply.pressure, device.supply.atmospheric_pressure
+    # Gauge is the same at both: a bottle's file knows no atmosphere, and stands in that of the device.
+    own_pressure = to_si(bottle.entries[SET_PRESSURE].value, bottle.entries[SET_PRESSURE].unit, "Pa_a", room)
     wrong: list[PpafoError] = []
     if not is_of_bottle(device.gas.molar_mass, bottle):
         species, fed = bottle.fluid.name, device.gas.species
         choice = f"set gas.species={species}, or choose a bottle of {fed}"
         wrong.append(reading.refusal(BOTTLE_NAME, f"contains {species}, but the device uses {fed}: {choice}"))
-    if own_pressure is not None:
-        room = device.supply.atmospheric_pressure
+    # A bottle of the package is set to the paper's pressure, which does not apply to other devices.
+    if path.suffix == ".toml" and abs(own_pressure - pressure) > _SAME_PRESSURE * pressure:
         own_text = shown_text(own_pressure, "Pa_a", atmosphere=room, unit=bottle.entries[SET_PRESSURE].unit)
         problem = f"{name} sets {SET_PRESSURE} to {own_text}, but supply.pressure is"
         problem += f" {shown_text(pressure, 'Pa_a', atmosphere=room)}: set supply.pressure={own_text}"
@@ -189,17 +191,6 @@ def _numbers(reading: DocumentReader, section: Mapping[str, Any], bottle: Bottle
         given = f"{GRAMS_PER_KILOGRAM * mass:.4g} g of {bottle.fluid.name}"
         raise ScenarioError(f"{reading.file}: [{BOTTLE}]: {BOTTLE}.fill is {given}, but {fits}")
     return numbers
-
-
-def other_pressure(name: str | Path, bottle: Bottle, device: Device) -> float | None:
-    """Return the regulator's set pressure [Pa absolute] in a bottle file, None if it agrees with the supply pressure.
-
-    A bottle of the package is set to the paper's pressure, which does not apply to other devices: None.
-    """
-    pressure, stated = device.supply.pressure, bottle.entries[SET_PRESSURE]
-    # Gauge is the same at both: a bottle's file knows no atmosphere, and stands in that of the device.
-    own = to_si(stated.value, stated.unit, "Pa_a", device.supply.atmospheric_pressure)
-    return own if Path(name).suffix == ".toml" and abs(own - pressure) > _SAME_PRESSURE * pressure else None
 
 
 def is_of_bottle(molar_mass: float, bottle: Bottle) -> bool:
