@@ -26,10 +26,10 @@ from ppafo.engine.cache.texts import kept_bytes
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports import filled, template
 from ppafo.exports.c_library import library_of
-from ppafo.exports.c_library.conditions import limits_in_c
 from ppafo.exports.c_library.entries import with_reach
 from ppafo.exports.c_library.files import OUTPUTS, library_files
 from ppafo.exports.c_library.library import ExportParameter, Library
+from ppafo.exports.c_library.settings import limits_in_c
 from ppafo.loading import load_scenario
 from ppafo.model.controlled import CONTROLLED
 from ppafo.parameters.graph import ATMOSPHERE_PATH

@@ -1,6 +1,6 @@
 """Loading of a walk scenario by name or file; every mistake is reported in a single line."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path

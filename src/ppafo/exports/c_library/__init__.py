@@ -6,24 +6,32 @@ from functools import partial
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError
-from ppafo.exports.c_library.conditions import RULES_OF_TIMES, choosing, other_samples, other_supply
 from ppafo.exports.c_library.entries import check_entry, follow_entry, prepare_entry
 from ppafo.exports.c_library.exported import exported
 from ppafo.exports.c_library.files import expected_csv, library_files
 from ppafo.exports.c_library.library import Library, Switch, c_identifier
 from ppafo.exports.c_library.preparation import PROFILE_RULES, VANE_PREPARATION, WALK_RULES, Preparation, has_rules
 from ppafo.exports.c_library.readme import words_of
-from ppafo.exports.c_library.settings import links_of, relations_of, relations_of_vane, rules_of_table, settings_of
+from ppafo.exports.c_library.settings import (
+    RULES_OF_TIMES,
+    choosing,
+    relations_of,
+    relations_of_vane,
+    rules_of_table,
+    settings_of,
+)
 from ppafo.model.catalog import ordered_effects
 from ppafo.model.declaration import PlainFunction
 from ppafo.model.effects.kind import Effect
 from ppafo.parameters.effects import effects_of
 from ppafo.simulation.clock import links_of_times, time_texts
 from ppafo.simulation.motion_kind import WALK
+from ppafo.simulation.numbers import links_that_hold
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.wording import argument_text
 
+_TIMES = ("run_output_interval", "run_step", "controller_period", "run_duration")
 _FLAWS = (
     *("sensors_angle_noise", "sensors_pressure_noise", "sensors_angle_resolution", "sensors_pressure_resolution"),
     *("sensors_angle_bandwidth", "sensors_pressure_bandwidth"),
@@ -69,9 +77,15 @@ def library_of(scenario: Scenario) -> Library:
     exporting = exported(batch_of(plan_run(scenario)).program)
     program, device = exporting.program, scenario.device
     settings = settings_of(scenario, record_interval(scenario.run.duration) if is_walk else None)
-    links = links_of(scenario, settings, of_walk.LINKS_OF_WALK if is_walk else links_of_times(time_texts(scenario)))
     places = {setting.path: float(place) for place, setting in enumerate(settings, 1)}
-    preparation, other_program = Preparation(scenario, program, places), [other_supply(device)]
+    links = {**links_that_hold(scenario)}
+    links |= of_walk.LINKS_OF_WALK if is_walk else links_of_times(time_texts(scenario))
+    links = {path: follows for path, follows in links.items() if path in places}
+    preparation, plant = Preparation(scenario, program, places), "prepared->parameters.plant"
+    # Gas is drawn where the program feeds it, or the reverse.
+    pressures = f"{plant}.supply_pressure", f"{plant}.dorsiflexion_pressure"
+    below = " || ".join(f"{pressure} < {plant}.atmospheric_pressure" for pressure in pressures)
+    other_program = [(f"!({below})" if device.supply.is_vacuum else below, "supply_pressure")]
     preparing: Sequence[PlainFunction] = VANE_PREPARATION
     checks: Sequence[PlainFunction] = PROFILE_RULES
     of_sensors: list[Switch]
@@ -92,7 +106,11 @@ def library_of(scenario: Scenario) -> Library:
             ),
         ]
         defaults = [setting.path for setting in settings if setting.path in links and setting.quantity.follows]
-        other_program = [*other_samples(settings, program.samples_inside), *other_program]
+        # Samples begin or cease to lie between steps; a changed time is the one to report.
+        interval, values = "prepared->counts.interval", {setting.name: setting.value for setting in settings}
+        moved = f"({interval} != (double)(int64_t){interval}) != {'true' if program.samples_inside else 'false'}"
+        changed = [(f"{moved} && settings->{name} != {values[name]!r}", name) for name in _TIMES]
+        other_program = [*changed, (moved, _TIMES[0]), *other_program]
     of_valve = [((f"valve_{name}",), device.valve.settings[name] > 0.0) for name in choosing(device)]
     of_effects = [(names_of_switch(effect), True) for effect in effects_of(device) if effect.switch]
     return Library(

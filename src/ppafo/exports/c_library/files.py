@@ -8,9 +8,9 @@ from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.run import NEVER_FAILED
 from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.exports import filled, in_comment, in_markdown, template
-from ppafo.exports.c_library.conditions import conditions_of_program, limits_in_c
-from ppafo.exports.c_library.library import Library
+from ppafo.exports.c_library.library import Condition, Library
 from ppafo.exports.c_library.program import c_text_of_run
+from ppafo.exports.c_library.settings import limits_in_c
 from ppafo.running import simulate
 from ppafo.signals import CHANNELS
 from ppafo.simulation.scenario import Scenario
@@ -118,6 +118,15 @@ def _words(library: Library, name: str) -> dict[str, str]:
         limits += [f"up to {quantity.maximum:g}"] if quantity.maximum < math.inf else []
         meaning = "; ".join(filter(None, (quantity.summary or quantity.name, " ".join(limits))))
         fields.append((setting.name, quantity.unit, library.worded(meaning)))
+    # Conditions under which settings require another compiled program, each with the setting to report.
+    values, other_program = {setting.name: setting.value for setting in settings}, list[Condition]()
+    for names, is_above in library.switches:
+        if is_above:
+            # The setting that switches the program on is the one to name where all of them are 0.
+            was_above = next(each for each in names if values[each] > 0.0)
+            other_program.append((f"!({' || '.join(f'settings->{each} > 0.0' for each in names)})", was_above))
+        else:
+            other_program += [(f"settings->{each} > 0.0", each) for each in names]
     # Every scenario has a supply pressure, which is what a user would try first.
     (pressure,) = [setting for setting in settings if setting.name == "supply_pressure"]
     return {
@@ -140,7 +149,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "relations": _returning((f"!({condition})", setting) for condition, setting in relations),
         "is_whole": _IS_WHOLE if any("is_whole(" in condition for condition, _ in relations) else "",
         "profiles": "" if library.checking is None else _CHECKED,
-        "needs_other": _returning(conditions_of_program(library)),
+        "needs_other": _returning([*other_program, *library.other_program]),
         "csv_head": ",".join(outputs),
         "csv_form": ",".join(["%.17g"] * len(outputs)),
         "csv_values": ",\n".join(f"            outputs.{output}" for output in outputs),

@@ -1,10 +1,9 @@
 """README paragraphs of an exported library on its scenario or walk."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
-from ppafo.exports.c_library.conditions import choosing
 from ppafo.exports.c_library.library import c_identifier
-from ppafo.exports.c_library.settings import numbers_of_second_chamber
+from ppafo.exports.c_library.settings import choosing, numbers_of_second_chamber
 from ppafo.metrics import METRICS
 from ppafo.parameters.device import SonicOrifice
 from ppafo.parameters.effects import effects_of
@@ -36,7 +35,14 @@ def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
     flawless = [] if any(kind.flaws(scenario)) else ["the sensor errors of `sensors_`"]
     selecting = f"which settings of valve and sensors are 0 (here {', '.join([*zero, *flawless]) or 'none'})"
     of_both = [*_fixed_of_device(scenario), selecting]
-    followers = _followers(links, numbers_of_second_chamber(scenario))
+    # A missing chamber has the pressure of the atmosphere; its other numbers are constants and omitted.
+    absent, followed = numbers_of_second_chamber(scenario), list[str]()
+    for path, follows in links.items():
+        paths = [each for link in follows for each in link.sources if each not in absent or "pressure" in each]
+        paths = [ATMOSPHERE_PATH if each in absent else each for each in paths]
+        sources = dict.fromkeys(f"`{c_identifier(each)}`" for each in paths)
+        followed.append(f"`{c_identifier(path)}` ({', '.join(sources)})")
+    followers = _FOLLOWS.format(followers=", ".join(followed) or "none")
     if kind.layout != WALK:
         motion = f"the reference, `{scenario.reference.kind}`, and the motion, {vane_motion(scenario).form}"
         left_out = ", ".join(f"`{kind.name}`" for kind in METRICS.values() if kind.traced)
@@ -56,20 +62,6 @@ def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
         "traps": f"{followers}\n{_TRAPS_OF_WALK}",
         "metrics_said": _METRICS_OF_WALK,
     }
-
-
-def _followers(links: Graph, absent: Collection[str]) -> str:
-    """Return the README line on parameters that follow others; ``absent`` are the numbers of a missing chamber.
-
-    Its pressures appear as the atmospheric pressure; its other numbers are constants and omitted.
-    """
-    followers = []
-    for path, follows in links.items():
-        paths = [each for link in follows for each in link.sources if each not in absent or "pressure" in each]
-        paths = [ATMOSPHERE_PATH if each in absent else each for each in paths]
-        sources = dict.fromkeys(f"`{c_identifier(each)}`" for each in paths)
-        followers.append(f"`{c_identifier(path)}` ({', '.join(sources)})")
-    return _FOLLOWS.format(followers=", ".join(followers) or "none")
 
 
 def _fixed_of_device(scenario: Scenario) -> list[str]:

@@ -1,20 +1,23 @@
 """Settings of an exported scenario: every number by path, in SI units, and required relations between them."""
 
+import itertools
+import sys
 from collections.abc import Collection, Iterable
 from dataclasses import replace
 
 from ppafo.exports.c_library.library import Condition, ExportParameter, Relation, c_identifier
-from ppafo.model.catalog import device_effects
+from ppafo.model.catalog import VALVES, device_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.actuator_table import measured_pressures
 from ppafo.parameters.building import COVERED_PRESSURE, SAME_STOP, SUPPLIES, consistency
 from ppafo.parameters.declaration import OF_SECOND_CHAMBER
 from ppafo.parameters.declared import value_at
+from ppafo.parameters.device import Device
 from ppafo.parameters.effects import effects_of
-from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH, Graph
+from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.simulation.clock import step_unless_given, step_with_output, time_texts
 from ppafo.simulation.declaration import LOCKED_ANGLE, RUN
-from ppafo.simulation.numbers import declared_numbers, links_that_hold, number_at, other_form, path_of_locked_angle
+from ppafo.simulation.numbers import declared_numbers, number_at, other_form, path_of_locked_angle
 from ppafo.simulation.profiles import TOLERANCE
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import parse_quantity
@@ -25,6 +28,37 @@ _DESCRIPTIONS = {
     "controller.period": "time between two decisions of the controller",
 }
 """Descriptions of settings that differ from those in a file."""
+RULES_OF_TIMES: tuple[Condition, ...] = (
+    ("is_whole(settings->run_duration / settings->run_output_interval)", "run_output_interval"),
+    ("settings->run_duration / settings->run_step <= 1.0e8", "run_duration"),
+    ("settings->run_duration / settings->run_output_interval <= 5.0e6", "run_duration"),
+    ("settings->sensors_delay / settings->run_step <= 1.0e5", "sensors_delay"),
+)
+"""Rules of the times of a scenario (``simulation/clock.py``)."""
+
+
+def limits_in_c(quantity: Quantity) -> tuple[float, float]:
+    """Lowest and highest value of a setting, as representable by C literals."""
+    # C can write no infinity as a literal; no setting is that large.
+    return max(quantity.minimum, -sys.float_info.max), min(quantity.maximum, sys.float_info.max)
+
+
+def choosing(device: Device) -> list[str]:
+    """Settings of the valve for which zero or nonzero selects its functions."""
+    kind = VALVES[device.valve.kind]
+    names = [quantity.name for quantity in kind.quantities]
+    chosen = {}
+    # A valve may look only at which settings are 0, so both cases of each tell what chooses.
+    for pattern in itertools.product((0.0, 0.01), repeat=len(names)):
+        # The model and whether it has a dead time: both decide which program is composed.
+        settings = kind.settings(*pattern)
+        model = kind.choose(settings)
+        chosen[pattern] = model, model.command_delay(settings) > 0.0
+    return [
+        name
+        for index, name in enumerate(names)
+        if any(chosen[pattern] != chosen[*pattern[:index], 0.0, *pattern[index + 1 :]] for pattern in chosen)
+    ]
 
 
 def settings_of(scenario: Scenario, recorded: float | None) -> tuple[ExportParameter, ...]:
@@ -59,12 +93,6 @@ def settings_of(scenario: Scenario, recorded: float | None) -> tuple[ExportParam
         )
         for path, quantity in declared.items()
     )
-
-
-def links_of(scenario: Scenario, settings: Iterable[ExportParameter], of_times: Graph) -> Graph:
-    """Return the links by which settings follow others unless changed; ``of_times`` are those of the times of a run."""
-    known = {setting.path for setting in settings}
-    return {path: links for path, links in {**links_that_hold(scenario), **of_times}.items() if path in known}
 
 
 def relations_of(

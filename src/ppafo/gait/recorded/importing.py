@@ -190,8 +190,9 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     fitted = {name: fit_curve(curve.mean, HARMONICS[name], curve.spread) for name, curve in curves.items()}
     errors = {name: error for name, (_, error) in fitted.items()}
     walk = {name: footfalls.walk[name] for name in curves}
-    with noted_in(wrong):
-        check_scatter(curves, errors, walk)
+    most = f"at most {100.0 * REFUSED_SPREAD:.0f} % and {100.0 * REFUSED_MISFIT:.0f} % are accepted"
+    scattering = _scatters(curves, errors, REFUSED_SPREAD, REFUSED_MISFIT)
+    wrong += [DataError(f"{walk[name].file}: {message}; {most}") for name, message in scattering]
     with noted_in(wrong):
         # The ankle of the other foot looks like a wrong zero to the checks of the curves.
         check_side(mean_stride, load_gait())
@@ -454,17 +455,11 @@ def _remarks(
         *(moment_remarks(means["ankle_moment"]) if "ankle_moment" in means else []),
         *([zero] if foot.terms is None else []),
         *zero_remarks(means["shank_angle"], means["ankle_angle"]),
-        *scatter_remarks(curves, errors),
+        *(
+            f"{message}: the data are noisy, or the walk is not steady"
+            for _, message in _scatters(curves, errors, REMARKED_SPREAD, REMARKED_MISFIT)
+        ),
     ]
-
-
-def check_scatter(
-    curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError], walk: Mapping[str, Signal]
-) -> None:
-    """Raise DataError for curves that scatter by a quarter of their range, or whose Fourier series fits badly."""
-    most = f"at most {100.0 * REFUSED_SPREAD:.0f} % and {100.0 * REFUSED_MISFIT:.0f} % are accepted"
-    scatters = _scatters(curves, errors, REFUSED_SPREAD, REFUSED_MISFIT)
-    raise_noted([DataError(f"{walk[name].file}: {message}; {most}") for name, message in scatters])
 
 
 def _scatters(
@@ -482,9 +477,3 @@ def _scatters(
                 f"{name} has, relative to its range, a standard deviation between strides of {100.0 * spread:.0f} % "
                 f"and an RMS error of its Fourier series of {100.0 * misfit:.1f} %",
             )
-
-
-def scatter_remarks(curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError]) -> list[str]:
-    """Return a remark on each curve with unusual scatter between strides or an unusual misfit of its series."""
-    scatters = _scatters(curves, errors, REMARKED_SPREAD, REMARKED_MISFIT)
-    return [f"{message}: the data are noisy, or the walk is not steady" for _, message in scatters]

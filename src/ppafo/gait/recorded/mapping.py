@@ -209,23 +209,6 @@ def package_map() -> GaitMap:
     )
 
 
-def opensim_map(side: Side) -> GaitMap:
-    """Return the map of OpenSim's gait models: knee negative in flexion as in gait2392, ankle positive in dorsiflexion.
-
-    The shank angle is the sum of pelvis tilt, hip flexion and knee flexion in the sagittal plane. The lean of the thigh
-    is computed in the same way, with the hip at the origin of the pelvis.
-    """
-    foot = side[0]
-    force = "ground_force_vy" if side == "right" else "l_ground_force_vy"
-    return GaitMap(
-        shank_angle=ShankMap(terms=("pelvis_tilt", f"hip_flexion_{foot}", f"knee_angle_{foot}")),
-        ankle_angle=AngleMap(terms=(f"ankle_angle_{foot}",), positive="dorsiflexion"),
-        ankle_moment=MomentMap(terms=(f"ankle_angle_{foot}_moment",), positive="dorsiflexion"),
-        vertical_force=ForceMap(terms=(force,)),
-        knee=KneeMap(forward=("pelvis_tx",), up=("pelvis_ty",), thigh=("pelvis_tilt", f"hip_flexion_{foot}")),
-    )
-
-
 def load_map(path: str | Path) -> GaitMap:
     """Load a gait map from a TOML file; raises DataError if it cannot be used."""
     loaded, file = read_record(_FILE, GaitMap, path)

@@ -16,7 +16,7 @@ from ppafo.errors import DataError, refused_as
 from ppafo.gait.recorded.delimited import NumberBlock, cells_of, tabbed_lines, table_of
 from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.forms.comma_separated import plain_names, read_plain_csv
-from ppafo.gait.recorded.mapping import ForceMap, KneeMap, PressureMap, ShankMap, Side, opensim_map
+from ppafo.gait.recorded.mapping import AngleMap, ForceMap, GaitMap, KneeMap, MomentMap, PressureMap, ShankMap, Side
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import TIME
 from ppafo.storage.files import read_bytes
@@ -168,18 +168,27 @@ _SIDES = {"right": {"r", "right"}, "left": {"l", "left"}}
 
 
 def opensim_convention(table: MotionTable, side: Side, _body_mass: float) -> Convention:
-    """Return the map of OpenSim's labels; a force plate known only by number belongs to the foot that moves with it."""
-    usual = opensim_map(side)
-    terms = []
-    for name in usual.shank_angle.terms or ():
+    """Return the map of OpenSim's labels; a force plate known only by number belongs to the foot that moves with it.
+
+    As in OpenSim's gait models, the ankle is positive in dorsiflexion. The lean of the shank is the sum of pelvis tilt,
+    hip and knee flexion in the sagittal plane, that of the thigh of the first two, with the hip at the pelvis.
+    """
+    foot, terms = side[0], list[str]()
+    for name in ("pelvis_tilt", f"hip_flexion_{foot}", f"knee_angle_{foot}"):
         flexion = table.columns.get(name) if name.startswith(_KNEE) else None
         # Where its flexion counts above 0, as in the newer OpenSim models, the knee is subtracted.
         counts_above = flexion is not None and bool(np.nanmax(flexion) > -np.nanmin(flexion))
         terms.append(f"-{name}" if counts_above else name)
-    maps: dict[str, Any] = {"shank_angle": ShankMap(terms=tuple(terms))}
+    usual = GaitMap(
+        shank_angle=ShankMap(terms=tuple(terms)),
+        ankle_angle=AngleMap(terms=(f"ankle_angle_{foot}",), positive="dorsiflexion"),
+        ankle_moment=MomentMap(terms=(f"ankle_angle_{foot}_moment",), positive="dorsiflexion"),
+        knee=KneeMap(forward=("pelvis_tx",), up=("pelvis_ty",), thigh=("pelvis_tilt", f"hip_flexion_{foot}")),
+    )
+    maps: dict[str, Any] = {}
     # Columns that this package adds to the coordinates of OpenSim (``storage/opensim.py``) are read as they are.
-    if f"shank_angle_{side[0]}" in table.columns:
-        maps["shank_angle"] = ShankMap(terms=(f"shank_angle_{side[0]}",))
+    if f"shank_angle_{foot}" in table.columns:
+        maps["shank_angle"] = ShankMap(terms=(f"shank_angle_{foot}",))
     if {"knee_forward", "knee_up"} <= set(table.columns):
         maps["knee"] = KneeMap(forward=("knee_forward",), up=("knee_up",), unit="m/s^2")
     if "centre_of_pressure" in table.columns:
