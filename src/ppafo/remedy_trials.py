@@ -11,10 +11,10 @@ from ppafo.model.controlled import TORQUE
 from ppafo.simulation import simulate as of_loaded
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking.remedies import change_text, rank
 from ppafo.units.shown import shown_in
 
 if TYPE_CHECKING:
+    from ppafo.simulation.at_hand import RecordedResult
     from ppafo.simulation.tracking import Tracking
     from ppafo.simulation.tracking.remedies import Remedy
 
@@ -26,13 +26,15 @@ _LESS_ERROR = 0.5
 """Remaining error divided by the original one, below which a remedy that does not suffice is reported [-]."""
 
 
-def tried(scenario: Scenario, verdict: "Tracking") -> "Tracking":
-    """Return a tracking verdict with the first remedy that succeeds in a simulation.
+def verdict_of(result: "RecordedResult") -> "Tracking":
+    """Return the tracking verdict on a run, with the first remedy that succeeds in a simulation.
 
     Remedies are the overrides named in the verdict. If only a remedy of a less certain cause succeeds, that cause
     becomes the cause of the verdict. If none succeeds, the verdict gets the remedy with the smallest remaining error
     (of a walk: in its first strides), provided that this is less than half of the original one.
     """
+    scenario = result.scenario
+    verdict = result.tracking
     if not verdict.is_useless:
         return verdict
     # Changes made in Python would be lost with overrides.
@@ -83,6 +85,8 @@ def _first_strides(scenario: Scenario) -> Scenario:
 
 def _trials(scenario: Scenario, verdict: "Tracking", is_of_file: bool) -> "list[tuple[str, Remedy, Scenario]]":
     """Return cause, remedy and changed scenario for each remedy that can be applied, the most certain cause first."""
+    from ppafo.simulation.tracking.remedies import rank
+
     causes = [(verdict.cause, remedy) for remedy in verdict.remedies]
     causes += [(other.text, remedy) for other in verdict.others for remedy in sorted(other.remedies, key=rank)]
     # The task is changed last, whichever cause asks for it; before it each cause has the loop before the device.
@@ -106,6 +110,7 @@ def _remainder_text(verdict: "Tracking", errors: "list[tuple[Remedy, float]]", s
 
     ``strides`` are words for the part of a walk over which the errors are taken.
     """
+    from ppafo.simulation.tracking.remedies import change_text
     from ppafo.simulation.tracking.verdict import time_text
 
     best, error = min(errors, key=lambda pair: pair[1], default=(None, verdict.error))

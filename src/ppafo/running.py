@@ -13,6 +13,7 @@ from ppafo.loading import scenario_or_load
 from ppafo.model.sensors import GaitMeasurement, Measurement
 from ppafo.model.valves.kind import VENT
 from ppafo.plugins import Plugins, name_plugins
+from ppafo.remedy_trials import verdict_of
 from ppafo.simulation import simulate as of_loaded
 from ppafo.simulation.contradictions import check_no_bottle
 from ppafo.simulation.plan import plan_run
@@ -22,7 +23,6 @@ from ppafo.simulation.simulate import Result, result_of
 
 if TYPE_CHECKING:
     from ppafo.simulation.gains import Gains
-    from ppafo.simulation.tracking import Tracking
 
 _NUMBER = accepted_values(float)
 
@@ -54,14 +54,7 @@ def simulate(scenario: Scenario | str | Path, overrides: Overrides = (), *, plug
     0.196 N m
     """
     name_plugins(plugins)
-    return replace(of_loaded.simulate(scenario_or_load(scenario, overrides)), tries=_tried)
-
-
-def _tried(scenario: Scenario, verdict: "Tracking") -> "Tracking":
-    """Return a verdict with the first of its remedies that succeeds in a further run."""
-    from ppafo.remedy_trials import tried
-
-    return tried(scenario, verdict)
+    return replace(of_loaded.simulate(scenario_or_load(scenario, overrides)), tries=verdict_of)
 
 
 def gains(scenario: Scenario) -> "Gains | None":
@@ -97,7 +90,7 @@ def simulate_many(
     """
     name_plugins(plugins)
     results = of_loaded.simulate_many([scenario_or_load(scenario) for scenario in scenarios], threads)
-    return [replace(result, tries=_tried) for result in results]
+    return [replace(result, tries=verdict_of) for result in results]
 
 
 class GivenCommands:

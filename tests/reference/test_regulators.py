@@ -19,7 +19,7 @@ from ppafo.model.valves.pressure_regulator import MODEL, STAGE, RegulatorSetting
 from ppafo.parameters.graph import SECOND_PRESSURE_PATH
 from ppafo.parameters.plant import plant_parameters
 from ppafo.parameters.reach import static_torque, supply_for, torque_reach
-from ppafo.remedy_trials import tried
+from ppafo.remedy_trials import verdict_of
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
@@ -200,7 +200,7 @@ def test_a_verdict_names_the_number_of_the_regulator_that_is_at_fault(
     motion, reference = (LOCKED, torque) if level else ({**FREE, "angle": "90 deg"}, WAVE)
     overrides = (f"valve.{each}" for each in ("sonic_conductance=1 l/(s bar)", *changes))
     scenario = regulated(motion, law, reference, *overrides, duration="3 s")
-    verdict = tried(scenario, simulate(scenario).tracking)
+    verdict = verdict_of(simulate(scenario))
     assert verdict.cause == f"the set pressure is kept off the command by `valve.{number}`"
     assert "it follows, as a further run shows" in verdict.tried
 
@@ -269,7 +269,7 @@ def test_a_pressure_below_the_lowest_set_one_is_the_cause_where_it_lasts() -> No
         reference = {"of": "pressure_1", "kind": "ramp_hold", "start_level": start, "level": level}
         lowest = "valve.lowest_pressure=0.4 bar_g"
         scenario = regulated(LOCKED, {"kind": "pid"}, {**reference, "ramp_time": "1 s"}, lowest, duration="3 s")
-        verdict = tried(scenario, simulate(scenario).tracking)
+        verdict = verdict_of(simulate(scenario))
         assert verdict.follows is follows
     assert verdict.cause.startswith("the regulator sets no less than `valve.lowest_pressure = 0.4 bar_g`")
     assert "valve.lowest_pressure=0.02 bar_g'] it follows" in verdict.tried

@@ -378,14 +378,14 @@ def _cases(
     """
     import numpy as np
 
-    from ppafo.remedy_trials import tried
+    from ppafo.remedy_trials import verdict_of
     from ppafo.study.runs import FAILED
 
     cases, draws = list[ComparedCase](), found.draws
     for name, (nominal, rows, reason, verdicts) in runs.items():
         status = nominal.status
         with said_of_configuration(name):
-            tracking = tried(nominal.scenario, nominal.tracking)
+            tracking = verdict_of(nominal)
         follows = status.is_completed and not tracking.is_useless
         word: str = status.kind
         if tracking.fails and status.is_completed:

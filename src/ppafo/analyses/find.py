@@ -333,7 +333,7 @@ def judged(runs: Rows, limit: MetricLimit, reach_varies: bool, streams: int) -> 
 
 def _verdict(base: Scenario, path: VariedPath, value: float, has_remedy: bool) -> str:
     """Return value [SI] and verdict of its run, a torque beyond the actuator's included, with the remedy if asked."""
-    from ppafo.remedy_trials import tried
+    from ppafo.remedy_trials import verdict_of
     from ppafo.running import simulate
     from ppafo.simulation.declaration import changes_reach
     from ppafo.simulation.tracking.remarks import standing_still
@@ -344,7 +344,7 @@ def _verdict(base: Scenario, path: VariedPath, value: float, has_remedy: bool) -
     # Given in the unit of the range, the value and what is said of it are in that unit.
     result = simulate(with_overrides(base, [f"{path.path}={path.quote(value, '.17g')}"]))
     # The remedy that succeeds decides between possible causes.
-    verdict = tried(result.scenario, result.tracking)
+    verdict = verdict_of(result)
     lacking = float(shortfall(result.scenario).max())
     said = verdict.sentence
     # A value that follows within the limits may lie beyond reach, and is none to be found.

@@ -66,5 +66,5 @@ def tune(
     if seed is not None:
         # Noise alone follows the seed of the search; draws of a study keep the seed of the study.
         effort = replace(problem.effort, seed=seed)
-        problem = replace(problem, effort=effort, seed=problem.seed if problem.study else seed)
+        problem = replace(problem, effort=effort, seed=seed if problem.robust is None else problem.seed)
     return solve_tuning(problem, threads, progress, executor_of(executor))

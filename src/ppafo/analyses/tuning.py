@@ -30,24 +30,22 @@ from ppafo.parameters.overrides import over
 from ppafo.parameters.records import SchemaVersion, checked_record, keyed, record_schema
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report, report_nothing
+from ppafo.remedy_trials import verdict_of
 from ppafo.report.finding import Column, Finding, Section, columns_of
 from ppafo.report.kind import TIME, Kind, of_metric
-from ppafo.report.panels import Mark, Panel
+from ppafo.report.panels import Mark, Panel, dots
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILION
-from ppafo.simulation.clock import TIMES
-from ppafo.simulation.ensemble.columns import absolute
-from ppafo.simulation.numbers import NOISE_SEED, changes_in, with_numbers
+from ppafo.simulation.numbers import NOISE_SEED, changes_in
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.simulation.simulate import Result, simulate
-from ppafo.simulation.tracking.rule import shortfall
 from ppafo.studies.distributions import Distribution, Floats
 from ppafo.studies.draws import Uncertainty, uncertainty_of
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, difference_of, level_of
 from ppafo.studies.loading import list_studies, load_study, read_source
 from ppafo.studies.study import with_overrides
-from ppafo.studies.varying import VariedPath, given_in, in_its_unit, value_at, varied_path
-from ppafo.study.runs import Rows, RunCounter, Runs, scenario_runs
+from ppafo.studies.varying import VariedPath, distribution_in, given_in, in_its_unit, value_at, varied_path
+from ppafo.study.runs import Rows, RunCounter, scenario_runs
 from ppafo.units.shown import in_units, quantity_of_unit
 from ppafo.wording import count_of, first_twice, percentage, without_exponent
 
@@ -94,8 +92,8 @@ class SearchRange:
     spacing: Literal["linear", "logarithmic"] = keyed("default: linear", "linear")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GoalSection:
+@dataclass(frozen=True, slots=True)
+class ObjectiveTerm:
     """Section of a tuning file for a term of the minimised objective: weight times metric divided by scale.
 
     A metric with a negative weight is maximised.
@@ -127,6 +125,13 @@ class Robust:
     share: float = keyed(Number("", "", None, 0.5, math.nextafter(1.0, 0.0), plain=True), 0.9)
     draws: int = keyed(_Count("", None, 8, MAXIMUM_DRAWS), 64)
 
+    def __str__(self) -> str:
+        """Return the statistic of the draws by which candidates are evaluated, in words."""
+        if self.measure == "quantile":
+            return f"{100.0 * self.share:g} % quantile"
+        noun = "standard deviation" if self.deviations == 1.0 else "standard deviations"
+        return f"mean and {self.deviations:g} {noun}" if self.deviations else "mean"
+
 
 @dataclass(frozen=True, slots=True)
 class SearchEffort:
@@ -154,7 +159,7 @@ class TuningFile:
     scenario: str = keyed("name of a scenario, or a path relative to this file")
     overrides: tuple[str, ...] = keyed("such as 'valve.area=12.6mm^2'", ())
     search: tuple[SearchRange, ...]
-    objective: tuple[GoalSection, ...]
+    objective: tuple[ObjectiveTerm, ...]
     constraints: tuple[Constraint, ...] = ()
     robust: Robust | None = keyed("uncertainty to be robust against; default: the nominal device", None)
     effort: SearchEffort = SearchEffort()
@@ -167,83 +172,42 @@ TUNING = TomlKind("tuning", "tuning", resources.files("ppafo") / "analyses" / "t
 
 @dataclass(frozen=True, slots=True)
 class SearchedParameter:
-    """Searched parameter between its bounds, with its value before tuning [SI].
+    """Searched parameter: path with its units, uniform or log-uniform range, and value before tuning [SI]."""
 
-    ``is_logarithmic``: True if the logarithm of the value is searched
-    ``place``: conversion between values and text
-    """
-
-    path: str
-    minimum: float
-    maximum: float
-    is_logarithmic: bool
-    before: float
     place: VariedPath
+    range: Distribution
+    before: float
 
-    def value(self, fraction: Floats) -> Floats:
-        """Return values of the parameter [SI] at fractions of its range from minimum to maximum."""
-        kind = "log_uniform" if self.is_logarithmic else "uniform"
-        return Distribution(kind, (self.minimum, self.maximum)).values(fraction)
-
-    def fraction(self, value: float) -> float:
-        """Return the position of a value [SI] in the range, from 0 to 1; below 0 or above 1 beyond the bounds."""
-        if self.is_logarithmic:
-            return math.log(value / self.minimum) / math.log(self.maximum / self.minimum) if value > 0.0 else -math.inf
-        return (value - self.minimum) / (self.maximum - self.minimum)
-
-    def bound_reached(self, value: float) -> Literal["minimum", "maximum"] | None:
-        """Return the bound at which a value lies; None for a value between the bounds."""
-        fraction = self.fraction(value)
-        if fraction <= _AT_BOUND:
-            return "minimum"
-        return "maximum" if fraction >= 1.0 - _AT_BOUND else None
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectiveTerm:
-    """Term of the objective: weight times metric divided by scale [SI]; scale None is the value before tuning."""
-
-    metric: str
-    weight: float
-    scale: float | None
+    def quote(self, fraction: float) -> str:
+        """Format the value at a fraction of the range from minimum to maximum, with its unit, as in an override."""
+        return self.place.quote(float(self.range.values(np.asarray(fraction))))
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Problem:
-    """Tuning problem of a scenario, whose ``overrides`` include the caller's ``changes``.
+    """Tuning problem of a scenario, whose overrides include the caller's ``changes``.
 
-    Candidates are evaluated over ``draws`` of the ``uncertainty``, None for the nominal device with noise-free sensors;
-    ``study`` is empty if only sensor noise is drawn. What counts is the quantile of ``fraction``, or, if that is None,
-    the mean and ``deviations`` standard deviations.
+    Candidates are evaluated over ``draws`` of the ``uncertainty``; nothing is drawn for the nominal device with
+    noise-free sensors, and ``robust`` is None if only sensor noise is. ``scales`` are those given for metrics [SI].
     """
 
     name: str
     description: str
     scenario: Scenario
-    overrides: tuple[str, ...]
     searched: tuple[SearchedParameter, ...]
     goals: tuple[ObjectiveTerm, ...]
     constraints: tuple[MetricLimit, ...]
     effort: SearchEffort
+    scales: Mapping[str, float] = field(default_factory=dict)
     changes: tuple[str, ...] = ()
-    uncertainty: Uncertainty | None = None
-    study: str = ""
+    uncertainty: Uncertainty = field(default_factory=partial(Uncertainty, ()))
+    robust: Robust | None = None
     draws: int = 1
     seed: int = 0
-    deviations: float = 0.0
-    fraction: float | None = None
 
     def __repr__(self) -> str:
         """Return name, scenario and searched parameters."""
-        return f"Tuning '{self.name}' of '{self.scenario.name}': {', '.join(gain.path for gain in self.searched)}"
-
-    @property
-    def measure(self) -> str:
-        """Statistic of the draws by which candidates are evaluated, in words."""
-        if self.fraction is not None:
-            return f"{100.0 * self.fraction:g} % quantile"
-        noun = "standard deviation" if self.deviations == 1.0 else "standard deviations"
-        return f"mean and {self.deviations:g} {noun}" if self.deviations else "mean"
+        return f"Tuning '{self.name}' of '{self.scenario.name}': {', '.join(self.before)}"
 
     @property
     def is_worse_high(self) -> dict[str, bool]:
@@ -254,34 +218,28 @@ class Problem:
     @property
     def before(self) -> Gains:
         """Values of the gains before tuning [SI]."""
-        return {gain.path: gain.before for gain in self.searched}
+        return {gain.place.path: gain.before for gain in self.searched}
 
     def bad_end(self, values: Floats, is_high: bool) -> Floats:
         """Return the unfavourable end of values (candidates, draws) [SI], high or low, as an array (candidates,)."""
-        if self.uncertainty is None:
+        if not self.uncertainty.drawn:
             return values[:, 0]
-        if self.fraction is not None:
-            return np.asarray(np.quantile(values, self.fraction if is_high else 1.0 - self.fraction, axis=1))
+        if self.robust is not None and self.robust.measure == "quantile":
+            share = self.robust.share
+            return np.asarray(np.quantile(values, share if is_high else 1.0 - share, axis=1))
         # Of a sample, hence n - 1; the draws are the same for all candidates, so that it ranks them fairly.
-        deviations = self.deviations * np.std(values, axis=1, ddof=1)
-        return np.asarray(np.mean(values, axis=1) + (deviations if is_high else -deviations))
-
-    @property
-    def gauge(self) -> frozenset[str]:
-        """Searched and drawn paths whose values are gauge pressures, relative to the atmosphere of their run."""
-        drawn = frozenset[str]() if self.uncertainty is None else self.uncertainty.gauge
-        return drawn | {gain.path for gain in self.searched if gain.place.is_gauge}
+        away = (0.0 if self.robust is None else self.robust.deviations) * np.std(values, axis=1, ddof=1)
+        return np.asarray(np.mean(values, axis=1) + (away if is_high else -away))
 
     def gains(self, fractions: Sequence[float]) -> Gains:
         """Return the gains [SI] at fractions of their ranges, rounded as in the overrides to paste and as simulated."""
         # Through the text that is pasted: a run of that line gives these bits again.
-        pairs = list(zip(self.searched, fractions, strict=True))
-        texts = [gain.place.quote(float(gain.value(np.asarray(fraction)))) for gain, fraction in pairs]
-        return {gain.path: gain.place.level(text) for gain, text in zip(self.searched, texts, strict=True)}
+        pairs = zip(self.searched, fractions, strict=True)
+        return {gain.place.path: gain.place.level(gain.quote(fraction)) for gain, fraction in pairs}
 
     def lines(self, gains: Gains) -> list[str]:
         """Format gains as overrides, ``PATH=VALUE``."""
-        return [f"{gain.path}={gain.place.quote(gains[gain.path])}" for gain in self.searched]
+        return [f"{gain.place.path}={gain.place.quote(gains[gain.place.path])}" for gain in self.searched]
 
 
 @dataclass(frozen=True, slots=True)
@@ -327,12 +285,6 @@ class GainResult:
     result: Result = field(compare=False, repr=False)
 
     @property
-    def useless(self) -> str:
-        """Verdict on a nominal run that should follow its reference and does not; empty for others."""
-        tracking = self.result.tracking
-        return tracking.sentence if tracking.is_useless else ""
-
-    @property
     def is_feasible(self) -> bool:
         """True if all constraints are satisfied, no run failed and the reference is followed, also over fresh draws."""
         broken = self.violation or self.fresh_violation or self.share_without_value or self.fresh_share_without_value
@@ -343,15 +295,18 @@ class GainResult:
 class Tuned:
     """Result of a tuning: gains before and after, starts of the search, and remarks; numbers in SI units.
 
-    ``overrides`` turn the scenario of the tuning file into the tuned one; ``bounds_reached`` are gains that ended at a
-    bound, beyond which a better value may lie. The best of the ``starts`` is the first.
+    ``overrides`` turn the scenario of the tuning file into the tuned one, and ``lines`` are those of the gains;
+    ``bounds_reached`` are gains that ended at a bound, beyond which a better value may lie. The best of the ``starts``
+    is the first. ``follows``: False for a nominal run that should follow its reference and does not.
     """
 
     tuning: str
     scenario: str
     verdict: str
     is_feasible: bool
+    follows: bool
     overrides: list[str]
+    lines: list[str]
     bounds_reached: dict[str, Literal["minimum", "maximum"]]
     scales: dict[str, float]
     before: GainResult
@@ -360,11 +315,6 @@ class Tuned:
     runs: int
     remarks: list[str]
     problem: Problem = field(compare=False, repr=False)
-
-    @property
-    def lines(self) -> list[str]:
-        """Gains found, as overrides ``PATH=VALUE`` to paste."""
-        return self.problem.lines(self.after.gains)
 
 
 def list_tunings() -> tuple[str, ...]:
@@ -400,40 +350,48 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
     name_plugins(plugins)
     document, source = read_source(TUNING, tuning)
     parsed = checked_record(TuningFile, document, source.file, StudyError, source.text)
+    robust, paths = parsed.robust, [gain.path for gain in parsed.search]
     with refused_as(StudyError, source.file, ScenarioError, ParameterError, StudyError):
         scenario = load_scenario(placed(parsed.scenario, source.folder), parsed.overrides)
         scenario = reloaded(scenario, overrides) if overrides else scenario
-        metrics = [*(goal.metric for goal in parsed.objective), *(goal.metric for goal in parsed.constraints)]
+        metrics = [*(goal.metric for goal in parsed.objective), *(limit.metric for limit in parsed.constraints)]
         check_metrics(list(dict.fromkeys(metrics)), scenario)
-        paths = [gain.path for gain in parsed.search]
-        uncertain = _uncertain(parsed, source.folder, paths, scenario)
+        uncertainty, seed = Uncertainty(()).with_noise_of([scenario]), parsed.effort.seed
+        if robust is not None:
+            with refused_as(StudyError, "robust", StudyError):
+                study = load_study(beside(robust.study, source.folder, list_studies()))
+                uncertainty, seed = uncertainty_of(study).with_noise_of([scenario]), study.sample.seed
+                if (path := next(iter(study.only), None)) is not None:
+                    raise StudyError(f"'{path}' varies in some configurations only; choose a study without 'only'")
+                if (path := next((path for path in uncertainty.paths if path in paths), None)) is not None:
+                    raise StudyError(f"study '{study.name}' draws '{path}', which is also searched; omit one of both")
         if (repeated := first_twice(paths)) is not None:
             raise StudyError(f"'{repeated}' appears in two [[search]] tables; omit one")
-        drawn = uncertain.get("uncertainty")
-        atmosphere = atmosphere_of(scenario, (*(() if drawn is None else (*drawn.paths, *drawn.same)), *paths))
+        atmosphere = atmosphere_of(scenario, (*uncertainty.paths, *uncertainty.same, *paths))
+        scales = dict[str, float]()
+        for goal in parsed.objective:
+            if goal.weight == 0.0:
+                raise StudyError(f"objective '{goal.metric}': weight = 0 has no effect; omit this objective")
+            if goal.scale is not None:
+                where = f"objective '{goal.metric}': scale = '{goal.scale}'"
+                scales[goal.metric] = difference_of(goal.scale, goal.metric, where)
+                if scales[goal.metric] <= 0.0:
+                    raise StudyError(f"{where}: must be above 0")
         return Problem(
             name=parsed.name,
             description=" ".join(parsed.description.split()),
             scenario=scenario,
-            overrides=scenario.origin.overrides,
             searched=tuple(_searched(gain, scenario, atmosphere is None) for gain in parsed.search),
-            goals=tuple(map(_objective_term, parsed.objective)),
+            goals=parsed.objective,
             constraints=tuple(_metric_limit(constraint, atmosphere) for constraint in parsed.constraints),
             effort=parsed.effort,
+            scales=scales,
             changes=changes_in(scenario, overrides=overrides),
-            **uncertain,
+            robust=robust,
+            uncertainty=uncertainty,
+            draws=(NOISE_STREAMS if robust is None else robust.draws) if uncertainty.drawn else 1,
+            seed=seed,
         )
-
-
-def _objective_term(goal: GoalSection) -> ObjectiveTerm:
-    """Return a term of the objective with its scale in SI; StudyError for a weight of 0 or a scale not above 0."""
-    if goal.weight == 0.0:
-        raise StudyError(f"objective '{goal.metric}': weight = 0 has no effect; omit this objective")
-    where = f"objective '{goal.metric}': scale = '{goal.scale}'"
-    scale = None if goal.scale is None else difference_of(goal.scale, goal.metric, where)
-    if scale is not None and scale <= 0.0:
-        raise StudyError(f"{where}: must be above 0")
-    return ObjectiveTerm(goal.metric, goal.weight, scale)
 
 
 def _metric_limit(constraint: Constraint, atmosphere: float | None) -> MetricLimit:
@@ -445,101 +403,119 @@ def _metric_limit(constraint: Constraint, atmosphere: float | None) -> MetricLim
     if len(bounds) != 1:
         has = "both" if bounds else "neither"
         raise StudyError(f"constraint '{constraint.metric}': has {has} of at_most and at_least; give one of them")
-    where = f"constraint '{constraint.metric}' = '{bounds[0]}'"
-    limit = level_of(bounds[0], constraint.metric, where, atmosphere)
+    limit = level_of(bounds[0], constraint.metric, f"constraint '{constraint.metric}' = '{bounds[0]}'", atmosphere)
     return MetricLimit(constraint.metric, limit, constraint.at_most is not None, bounds[0])
 
 
 def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) -> SearchedParameter:
-    """Return a searched parameter with bounds in SI; StudyError for a path or bounds that cannot be searched."""
+    """Return a searched parameter with its range in SI; StudyError for a path or bounds that cannot be searched."""
+    kind, ends = "log_uniform" if gain.spacing == "logarithmic" else "uniform", (gain.minimum, gain.maximum)
     with refused_as(StudyError, f"search '{gain.path}'", UnitError, ScenarioError, StudyError):
-        place, ends = varied_path(gain.path, scenario), (gain.minimum, gain.maximum)
+        if gain.path == NOISE_SEED:
+            raise StudyError("cannot be searched, because all candidates use the same noise; omit this search")
+        place = varied_path(gain.path, scenario)
         place = given_in(in_its_unit(place, ends) if atmosphere_varies else place, ends)
-        minimum, maximum = map(place.level, ends)
-        before, is_logarithmic = value_at(gain.path, scenario), gain.spacing == "logarithmic"
-        if before is None:
+        between = distribution_in({"kind": kind, "minimum": gain.minimum, "maximum": gain.maximum}, place)
+        if (before := value_at(gain.path, scenario)) is None:
             raise StudyError(
                 f"scenario '{scenario.name}' has no value for '{gain.path}'; set it in the scenario or by an override"
             )
-        if gain.path == NOISE_SEED:
-            raise StudyError("cannot be searched, because all candidates use the same noise; omit this search")
-        if minimum >= maximum:
-            raise StudyError(f"minimum = {gain.minimum!r} must be less than maximum = {gain.maximum!r}")
-        if is_logarithmic and minimum <= 0.0:
-            raise StudyError(f"spacing = 'logarithmic' needs a minimum above 0, not {gain.minimum!r}")
     # Where the atmosphere varies, gauge bounds count from each run's own; so does the value before.
-    before -= place.atmosphere if place.is_gauge else 0.0
-    return SearchedParameter(gain.path, minimum, maximum, is_logarithmic, before, place)
-
-
-def _uncertain(parsed: TuningFile, folder: Path, searched: Sequence[str], scenario: Scenario) -> dict[str, Any]:
-    """Return the draws over which candidates are evaluated, as fields of the problem: of a study, of noise, or none."""
-    robust = parsed.robust
-    if robust is None:
-        noise = Uncertainty(()).with_noise_of([scenario])
-        return {"uncertainty": noise, "draws": NOISE_STREAMS, "seed": parsed.effort.seed} if noise.drawn else {}
-    with refused_as(StudyError, "robust", StudyError):
-        study = load_study(beside(robust.study, folder, list_studies()))
-        uncertainty = uncertainty_of(study).with_noise_of([scenario])
-        if study.only:
-            raise StudyError(
-                f"'{next(iter(study.only))}' varies in some configurations only; choose a study without 'only'"
-            )
-        if (both := next((path for path in uncertainty.paths if path in searched), None)) is not None:
-            raise StudyError(f"study '{study.name}' draws '{both}', which is also searched; omit one of both")
-    return {
-        "uncertainty": uncertainty,
-        "study": study.name,
-        "draws": robust.draws,
-        "seed": study.sample.seed,
-        "deviations": robust.deviations,
-        "fraction": robust.share if robust.measure == "quantile" else None,
-    }
+    return SearchedParameter(place, between, before - (place.atmosphere if place.is_gauge else 0.0))
 
 
 def solve_tuning(
     problem: Problem, threads: int | None, progress: Report | None, executor: Executor | None = None
 ) -> Finding[Tuned]:
     """Solve a tuning problem: search for gains, and evaluation of the gains before and after."""
-    report, effort, uncertainty = progress or report_nothing, problem.effort, problem.uncertainty
+    scenario, effort, uncertainty, report = (
+        problem.scenario,
+        problem.effort,
+        problem.uncertainty,
+        progress or report_nothing,
+    )
     # As many as are made if no start converges early: the first candidates are a generation of their own, the gains
     # before run for the scales and for their result, the gains found once, and both over fresh draws.
     of_start = len(problem.searched) * (effort.candidates_per_gain * (effort.generations + 1) + _REFINEMENTS)
-    most = problem.draws * (effort.starts * of_start + 3) + (0 if uncertainty is None else 2 * FRESH_DRAWS)
+    most = problem.draws * (effort.starts * of_start + 3) + 2 * FRESH_DRAWS * bool(uncertainty.drawn)
     counter = RunCounter(most, lambda now: report(replace(now, activity="tuning", is_bound=True)))
-    runs = scenario_runs(problem.scenario, [*problem.is_worse_high], counter, problem.gauge, threads, executor)
-    draws = {} if uncertainty is None else uncertainty.random_columns(0, problem.draws, problem.seed)
-    tried = _tried(runs, {path: [value] for path, value in problem.before.items()}, draws)
-    scales = dict[str, float]()
+    gauge = uncertainty.gauge | {gain.place.path for gain in problem.searched if gain.place.is_gauge}
+    # The fresh draws follow those of the search: the gains were not chosen on them.
+    draws, fresh = (
+        uncertainty.random_columns(first, count, problem.seed) if uncertainty.drawn else {}
+        for first, count in ((0, problem.draws), (problem.draws, FRESH_DRAWS))
+    )
+    runs = scenario_runs(scenario, [*problem.is_worse_high], counter, gauge, threads, executor)
+
+    def tried(candidates: Sequence[Gains], draws: Mapping[str, Floats]) -> Rows:
+        """Run every candidate with every draw; returns arrays (candidates, draws), one draw without uncertainty."""
+        count = len(next(iter(draws.values()), (0.0,)))
+        columns = {path: np.repeat([gains[path] for gains in candidates], count) for path in problem.before}
+        columns |= {path: np.tile(column, len(candidates)) for path, column in draws.items()}
+        return {name: column.reshape(-1, count) for name, column in runs.run(columns).items()}
+
+    # By default each goal is 1 before tuning: goals in different units then weigh as much as their weights say.
+    scales, first = dict(problem.scales), tried([problem.before], draws)
     for goal in problem.goals:
-        # By default each goal is 1 before tuning: goals in different units then weigh as much as their weights say.
-        before_tuning = problem.bad_end(tried[f"judged_{goal.metric}"], goal.weight > 0.0)
-        scale = abs(float(before_tuning[0])) if goal.scale is None else goal.scale
+        name, is_high = goal.metric, goal.weight > 0.0
+        scale = scales.setdefault(name, abs(float(problem.bad_end(first[f"judged_{name}"], is_high)[0])))
         if not np.isfinite(scale) or scale == 0.0:
             raise StudyError(
-                f"tuning '{problem.name}': objective '{goal.metric}' is {scale:g} before tuning, which cannot be its "
-                "scale; set scale = 'VALUE UNIT' in this objective"
+                f"tuning '{problem.name}': objective '{name}' is {scale:g} before tuning, which cannot be its scale; "
+                "set scale = 'VALUE UNIT' in this objective"
             )
-        scales[goal.metric] = scale
 
     def costs(fractions: Floats) -> Floats:
         # As they are pasted: what keeps a constraint by less than the last digit would break it.
-        candidates = [problem.gains(each) for each in fractions.tolist()]
-        values = {gain.path: np.array([gains[gain.path] for gains in candidates]) for gain in problem.searched}
-        return judge(_tried(runs, values, draws), problem, scales)["cost"]
+        return judge(tried([problem.gains(each) for each in fractions.tolist()], draws), problem, scales)["cost"]
 
-    starts = search(costs, [gain.fraction(gain.before) for gain in problem.searched], effort)
-    before, after = (
-        _evaluate(runs, problem, scales, gains, draws) for gains in (problem.before, problem.gains(starts[0].fractions))
-    )
-    bounds = ((gain.path, gain.bound_reached(after.gains[gain.path])) for gain in problem.searched)
+    def evaluated(gains: Gains) -> GainResult:
+        """Evaluate gains over the draws of the search, over fresh draws and on the nominal device."""
+        in_search = tried([gains], draws)
+        over_fresh = tried([gains], fresh) if fresh else in_search
+        scores, fresh_scores = (judge(rows, problem, scales) for rows in (in_search, over_fresh))
+        # Unchanged gains are not written and read again, which would round them.
+        is_changed = gains != problem.before
+        result = simulate(with_overrides(scenario, problem.lines(gains)) if is_changed else scenario)
+
+        def ends(rows: Rows, prefix: str = "") -> dict[str, float]:
+            worse = problem.is_worse_high.items()
+            return {name: float(problem.bad_end(rows[prefix + name], high)[0]) for name, high in worse}
+
+        return GainResult(
+            gains=gains,
+            values=ends(in_search),
+            fresh=ends(over_fresh) if fresh else {},
+            judged=ends(over_fresh, "judged_"),
+            objective=float(scores["objective"][0]),
+            violation=float(scores["violation"][0]),
+            off=float(max(scores["off"][0], fresh_scores["off"][0])),
+            share_off=float(np.mean(np.concatenate([in_search["off"], over_fresh["off"]], axis=1) > 0.0)),
+            share_without_value=float(scores["without_value"][0]),
+            fresh_violation=float(fresh_scores["violation"][0]),
+            fresh_share_without_value=float(fresh_scores["without_value"][0]),
+            beyond_reach=float(np.mean(over_fresh["beyond_reach"] > 0.0)),
+            metrics=result.metrics,
+            result=result,
+        )
+
+    starts = search(costs, [gain.range.fraction(gain.before) for gain in problem.searched], effort)
+    before, after = map(evaluated, (problem.before, problem.gains(starts[0].fractions)))
+    bounds: dict[str, Literal["minimum", "maximum"]] = {}
+    for gain in problem.searched:
+        fraction = gain.range.fraction(after.gains[gain.place.path])
+        if not _AT_BOUND < fraction < 1.0 - _AT_BOUND:
+            bounds[gain.place.path] = "minimum" if fraction <= _AT_BOUND else "maximum"
+    tracking, lines = verdict_of(after.result), problem.lines(after.gains)
     tuned = Tuned(
         tuning=problem.name,
-        scenario=problem.scenario.name,
-        verdict=_verdict(problem, before, after),
+        scenario=scenario.name,
+        verdict=f"{problem.name}: {_verdict(problem, before, after, tracking.sentence if tracking.is_useless else '')}",
         is_feasible=after.is_feasible,
-        overrides=list(over(problem.overrides, problem.lines(after.gains), valve=problem.scenario.device.valve_name)),
-        bounds_reached={path: bound for path, bound in bounds if bound is not None},
+        follows=not tracking.is_useless,
+        overrides=list(over(scenario.origin.overrides, lines, valve=scenario.device.valve_name)),
+        lines=lines,
+        bounds_reached=bounds,
         scales=scales,
         before=before,
         after=after,
@@ -549,20 +525,6 @@ def solve_tuning(
         problem=problem,
     )
     return _finding(replace(tuned, remarks=_remarks(tuned)))
-
-
-def _tried(runs: Runs, values: Mapping[str, Sequence[float] | Floats], draws: Mapping[str, Floats]) -> Rows:
-    """Run every candidate with every draw; returns arrays (candidates, draws), with one draw without uncertainty.
-
-    ``values`` are the gains by path, each (candidates,); ``draws`` are the uncertain values by path, each (draws,).
-    Candidates are ranked by ``judged_NAME``, ``off`` and ``unusable``: gains with which the loop oscillates are no
-    better than ones with which the run fails.
-    """
-    candidates = len(next(iter(values.values())))
-    count = len(next(iter(draws.values()))) if draws else 1
-    columns = {path: np.repeat(column, count) for path, column in values.items()}
-    columns |= {path: np.tile(column, candidates) for path, column in draws.items()}
-    return {name: column.reshape(candidates, count) for name, column in runs.run(columns).items()}
 
 
 def judge(rows: Rows, problem: Problem, scales: Mapping[str, float]) -> Rows:
@@ -682,99 +644,51 @@ def agreement(starts: Sequence[SearchStart]) -> float:
     return max(float(np.max(np.abs(np.subtract(start.fractions, best.fractions)))) for start in as_good)
 
 
-def _evaluate(
-    runs: Runs, problem: Problem, scales: Mapping[str, float], gains: Gains, draws: Mapping[str, Floats]
-) -> GainResult:
-    """Return the result of a set of gains over the draws of the search, over fresh draws and on the nominal device."""
-    candidate, fresh = {path: [value] for path, value in gains.items()}, dict[str, Floats]()
-    over_fresh = in_search = _tried(runs, candidate, draws)
-    if problem.uncertainty is not None:
-        # Draws that follow those of the search: the gains were not chosen on them.
-        fresh = problem.uncertainty.random_columns(problem.draws, FRESH_DRAWS, problem.seed)
-        over_fresh = _tried(runs, candidate, fresh)
-    scores, fresh_scores = (
-        {name: float(values[0]) for name, values in judge(rows, problem, scales).items()}
-        for rows in (in_search, over_fresh)
-    )
-    # Unchanged gains are not written and read again, which would round them.
-    is_changed = gains != problem.before
-    scenario = with_overrides(problem.scenario, problem.lines(gains)) if is_changed else problem.scenario
-    numbers = {path: each for path, each in absolute(scenario, fresh, problem.gauge).items() if path not in TIMES}
-    drawn, result = with_numbers(scenario, numbers), simulate(scenario)
-
-    def ends(rows: Rows, prefix: str = "") -> dict[str, float]:
-        return {
-            name: float(problem.bad_end(rows[prefix + name], high)[0]) for name, high in problem.is_worse_high.items()
-        }
-
-    return GainResult(
-        gains=gains,
-        values=ends(in_search),
-        fresh=ends(over_fresh) if fresh else {},
-        judged=ends(over_fresh, "judged_"),
-        objective=scores["objective"],
-        violation=scores["violation"],
-        off=max(scores["off"], fresh_scores["off"]),
-        share_off=float(np.mean(np.concatenate([in_search["off"], over_fresh["off"]], axis=1) > 0.0)),
-        share_without_value=scores["without_value"],
-        fresh_violation=fresh_scores["violation"],
-        fresh_share_without_value=fresh_scores["without_value"],
-        beyond_reach=float(np.mean(np.asarray(shortfall(drawn)) > 0.0)) if drawn.follows_reference else 0.0,
-        metrics=result.metrics,
-        result=result,
-    )
-
-
-def _verdict(problem: Problem, before: GainResult, after: GainResult) -> str:
-    """Return the result of a tuning as a sentence."""
+def _verdict(problem: Problem, before: GainResult, after: GainResult, useless: str) -> str:
+    """Return the result of a tuning as a sentence; ``useless`` is the verdict on a nominal run that does not follow."""
 
     def where(fraction: float) -> str:
-        return "" if problem.uncertainty is None else f" in {percentage(fraction, 2)} of the draws"
+        return "" if not problem.uncertainty.drawn else f" in {percentage(fraction, 2)} of the draws"
 
     beyond = (
-        f"; the reference requires more torque than the actuator gives at the supply pressure"
+        "; the reference requires more torque than the actuator gives at the supply pressure"
         f"{where(after.beyond_reach)}, which no gains can change"
     ) * (after.beyond_reach > 0.0)
     if after.share_without_value:
         failing = percentage(after.share_without_value, 3)
-        said = f"with the best gains found, {failing} of the runs fail, oscillate, or lack a required metric"
-    elif after.off:
+        return f"with the best gains found, {failing} of the runs fail, oscillate, or lack a required metric"
+    if after.off:
         missed = f"the tracking limits are exceeded by {percentage(after.off, 3)}{where(after.share_off)}"
-        said = "no gains within the bounds let the loop follow its reference; with the best gains found, "
-        said += f"{after.useless or missed}{beyond}"
-    elif after.violation:
+        said = "no gains within the bounds let the loop follow its reference; with the best gains found,"
+        return f"{said} {useless or missed}{beyond}"
+    if after.violation:
         broken = f"the best gains found exceed the limits by {percentage(after.violation, 3)}"
-        said = f"no gains within the bounds satisfy all constraints; {broken}{beyond}"
-    elif not after.is_feasible:
-        said = "the gains found satisfy all constraints over the draws of the search, but not over "
-        said += f"{FRESH_DRAWS:,} fresh draws{beyond}"
-    elif after.useless:
-        said = f"with the best gains found, {after.useless}"
-    elif before.off:
-        missed = f"with the previous gains it did not{where(before.share_off)}"
-        said = f"the loop follows its reference, {missed}; objective {after.objective:.4g}"
-    elif not before.is_feasible:
-        said = "the gains found satisfy all constraints, which the previous gains did not; objective "
-        said += f"{after.objective:.4g}"
+        return f"no gains within the bounds satisfy all constraints; {broken}{beyond}"
+    if not after.is_feasible:
+        said = "the gains found satisfy all constraints over the draws of the search, but not over"
+        return f"{said} {FRESH_DRAWS:,} fresh draws{beyond}"
+    if useless:
+        return f"with the best gains found, {useless}"
+    if before.off or not before.is_feasible:
+        said = f"the loop follows its reference, with the previous gains it did not{where(before.share_off)}"
+        said = said if before.off else "the gains found satisfy all constraints, which the previous gains did not"
+        return f"{said}; objective {after.objective:.4g}"
     # Beyond a bound the gains before are no candidates, and the best within may be worse.
-    elif after.objective >= before.objective:
-        said = "nothing better than the previous gains was found within the bounds"
-    else:
-        said = f"objective {before.objective:.4g} before, {after.objective:.4g} after"
-        if before.objective:
-            change = 100.0 * (after.objective - before.objective) / abs(before.objective)
-            said += f" ({without_exponent(change, '+.3g')} %)"
-    return f"{problem.name}: {said}"
+    if after.objective >= before.objective:
+        return "nothing better than the previous gains was found within the bounds"
+    change = 100.0 * (after.objective - before.objective) / (abs(before.objective) or math.inf)
+    percent = f" ({without_exponent(change, '+.3g')} %)" if before.objective else ""
+    return f"objective {before.objective:.4g} before, {after.objective:.4g} after{percent}"
 
 
 def _remarks(tuned: Tuned) -> list[str]:
     """Return remarks on convergence, bounds that were reached, ambiguous gains, draws, and a loop that swings."""
-    problem, after, starts = tuned.problem, tuned.after, tuned.starts
+    after, starts = tuned.after, tuned.starts
     remarks = [
         f"{count_of(len(starts), 'start')}, {sum(start.candidates for start in starts):,} "
         f"candidates, {tuned.runs:,} runs; {sum(start.is_settled for start in starts)} of {len(starts)} converged "
         "before the maximum number of generations",
-        *filter(None, [problem.scenario.origin.replaced]),
+        tuned.problem.scenario.origin.replaced,
     ]
     remarks += [
         f"{path} ended at its {bound}: a better value may lie beyond; widen the bounds if the device allows it"
@@ -785,44 +699,39 @@ def _remarks(tuned: Tuned) -> list[str]:
             f"starts whose objectives agree within 1 % differ by up to {100.0 * difference:.0f} % of the range between "
             "the bounds: the objective does not determine the gains uniquely"
         )
-    printed = after.fresh or after.values
-    return remarks + [
+    remarks += [
         f"the loop still oscillates in the second half of the hold, so {name} depends on the instant: the RMS error of "
         f"that half, {of_metric(name).number(judged)}, counts instead"
         for name, judged in after.judged.items()
-        if judged > printed[name]
+        if judged > (after.fresh or after.values)[name]
     ]
+    return list(filter(None, remarks))
 
 
 @in_units(lambda tuned: tuned.problem.scenario.device.shown)
 def _finding(tuned: Tuned) -> Finding[Tuned]:
     """Return the result of a tuning as a finding; it has passed if the gains satisfy all constraints."""
-    problem, after, scenario = tuned.problem, tuned.after, tuned.problem.scenario
+    problem, before, after, scenario = tuned.problem, tuned.before, tuned.after, tuned.problem.scenario
     rows = []
     for gain in problem.searched:
-        numbers = (gain.before, after.gains[gain.path], gain.minimum, gain.maximum)
-        end = f"at its {tuned.bounds_reached[gain.path]}" if gain.path in tuned.bounds_reached else ""
-        rows.append((gain.path, *map(gain.place.quote, numbers), end))
-    kinds, sides = {name: of_metric(name) for name in problem.is_worse_high}, {"before": tuned.before.values}
-    if problem.uncertainty is not None:
-        sides = {f"before ({problem.measure})": tuned.before.values}
-    sides["after"] = after.values
-    if problem.uncertainty is not None:
-        sides |= {"before, fresh draws": tuned.before.fresh, "after, fresh draws": after.fresh}
-        for title, side in (("before, nominal", tuned.before), ("after, nominal", after)):
+        path, quote = gain.place.path, gain.place.quote
+        end = f"at its {tuned.bounds_reached[path]}" if path in tuned.bounds_reached else ""
+        rows.append((path, quote(gain.before), quote(after.gains[path]), gain.quote(0.0), gain.quote(1.0), end))
+    sides: dict[str, Mapping[str, float]] = {"before": before.values, "after": after.values}
+    if problem.uncertainty.drawn:
+        sides = {f"before ({problem.robust or 'mean'})": before.values, "after": after.values}
+        sides |= {"before, fresh draws": before.fresh, "after, fresh draws": after.fresh}
+        for title, side in (("before, nominal", before), ("after, nominal", after)):
             sides[title] = {name: metric.value for name, metric in side.metrics.items()}
-    columns = {
-        "metric": [f"{name} ({kind.shown_unit})" if kind.quantity else name for name, kind in kinds.items()],
-        **{
-            title: [
-                kind.number(own[name]) if math.isfinite(own.get(name, math.nan)) else "" for name, kind in kinds.items()
-            ]
-            for title, own in sides.items()
-        },
-        "constraint": [
-            ", ".join(limit.words for limit in problem.constraints if limit.metric == name) for name in kinds
-        ],
-    }
+    kinds = {name: of_metric(name) for name in problem.is_worse_high}
+    table = [
+        Column("metric", [f"{name} ({kind.shown_unit})" if kind.quantity else name for name, kind in kinds.items()])
+    ]
+    for title, own in sides.items():
+        known = {name: kind.number(own.get(name, math.nan)) for name, kind in kinds.items()}
+        table.append(Column(title, ["" if text == "nan" else text for text in known.values()]))
+    limits = ([limit.words for limit in problem.constraints if limit.metric == name] for name in kinds)
+    table.append(Column("constraint", [", ".join(words) for words in limits]))
     # The scenario's file, or the name of one that comes with the package, finds it again.
     name, command = scenario.origin.file or scenario.name, scenario.motion.motion_kind.command
     # Texts of TOML and of Python alike.
@@ -841,7 +750,7 @@ def _finding(tuned: Tuned) -> Finding[Tuned]:
             Section("Gains", columns_of(("gain", "before", "after", "minimum", "maximum", ""), rows)),
             Section(
                 "Before and after",
-                [Column(title, cells) for title, cells in columns.items()],
+                table,
                 panels=partial(_task_panels, tuned),
                 name="task",
                 caption="The nominal device.",
@@ -858,7 +767,7 @@ def _finding(tuned: Tuned) -> Finding[Tuned]:
             Section("To use the gains", code=used),
         ),
         found=tuned,
-        passed=after.is_feasible and not after.useless,
+        passed=after.is_feasible and tuned.follows,
         files={"overrides.txt": pasted.encode},
         overrides=problem.changes,
     )
@@ -866,26 +775,25 @@ def _finding(tuned: Tuned) -> Finding[Tuned]:
 
 def _task_panels(tuned: Tuned) -> list[Panel]:
     """Return panels of controlled quantity, command and gas over time, before and after, for the nominal device."""
-    recording = tuned.after.result.recording
-    controlled = controlled_in(recording) or CONTROLLED[TORQUE]
+    before, after = tuned.before.result.recording, tuned.after.result.recording
+    controlled = controlled_in(after) or CONTROLLED[TORQUE]
     words, unit = controlled.words, controlled.level.unit
     kinds = {
         controlled.name: Kind(words[:1].upper() + words[1:], unit, quantity_of_unit(unit)),
         "command": Kind("Valve command"),
         "supplied_mass": Kind("Gas supplied", "kg", "gas mass"),
     }
-    # Broader below, so that both show where they agree.
-    sides = ((tuned.before, VERMILION, "before", 1.8), (tuned.after, BLUE, "after", 1.1))
     panels: list[Panel] = []
     for channel, kind in kinds.items():
-        marks = []
-        for setting, colour, label, width in sides:
-            own = setting.result.recording
-            style = {"linewidth": width, "drawstyle": "steps-post" if channel == "command" else "default"}
-            marks.append(Mark("line", own.time, own[channel], label=label, colour=colour, style=style))
-        if channel == controlled.name and controlled.reference in recording:
-            dashed, reference = {"linestyle": "--", "linewidth": 1.2}, recording[controlled.reference]
-            marks.append(Mark("line", recording.time, reference, label="reference", colour=BLACK, style=dashed))
+        drawn: dict[str, Any] = {"drawstyle": "steps-post" if channel == "command" else "default"}
+        # Broader below, so that both show where they agree.
+        marks = [
+            Mark("line", own.time, own[channel], label=label, colour=colour, style={"linewidth": width, **drawn})
+            for own, colour, label, width in ((before, VERMILION, "before", 1.8), (after, BLUE, "after", 1.1))
+        ]
+        if channel == controlled.name and controlled.reference in after:
+            dashed, reference = {"linestyle": "--", "linewidth": 1.2}, after[controlled.reference]
+            marks.append(Mark("line", after.time, reference, label="reference", colour=BLACK, style=dashed))
         panels.append(Panel(TIME, kind, marks, legend="" if panels else "figure", shares_x=True))
     return panels
 
@@ -909,22 +817,16 @@ def _search_panels(tuned: Tuned) -> list[Panel]:
             axes.set_yscale("log")
 
     rows = np.arange(len(searched))[::-1]
-    ends = [
-        gain.fraction(float(gain.value(np.array(fraction))))
-        for start in starts
-        for gain, fraction in zip(searched, start.fractions, strict=True)
-    ]
-    previous = [float(np.clip(gain.fraction(gain.before), -_BEYOND, 1.0 + _BEYOND)) for gain in searched]
-    found = [gain.fraction(tuned.after.gains[gain.path]) for gain in searched]
-    dots: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 7}
-    ticks: dict[str, Any] = {"linestyle": "", "marker": "|", "markersize": 11}
+    ends = np.array([start.fractions for start in starts]).ravel()
+    previous = np.clip([gain.range.fraction(gain.before) for gain in searched], -_BEYOND, 1.0 + _BEYOND)
+    found = [gain.range.fraction(tuned.after.gains[gain.place.path]) for gain in searched]
     marks = (
         *(Mark("line", [0.0, 1.0], [row, row], colour=GREY, style={"linewidth": 1.0}) for row in rows),
-        Mark("line", ends, np.tile(rows, len(starts)), label="end of a start", colour=BLACK, style=ticks),
-        Mark("line", previous, rows, label="before", colour=VERMILION, style={**dots, "marker": "s"}),
-        Mark("line", found, rows, label="after", colour=BLUE, style=dots),
+        dots(ends, np.tile(rows, len(starts)), "|", "end of a start", BLACK, markersize=11),
+        dots(previous, rows, "s", "before", VERMILION, markersize=7),
+        dots(found, rows, "o", "after", BLUE, markersize=7),
     )
-    every = {"yticks": rows, "yticklabels": [label_of(gain.path) for gain in searched], "xticks": [0.0, 1.0]}
+    every = {"yticks": rows, "yticklabels": [label_of(gain.place.path) for gain in searched], "xticks": [0.0, 1.0]}
     every |= {"ylim": (-0.6, len(searched) - 0.4), "xticklabels": ["minimum", "maximum"]}
     return [
         Panel(Kind("Generation"), Kind(), courses, "Objective, best so far", legend="inside", then=scale),

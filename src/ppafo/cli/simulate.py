@@ -96,7 +96,7 @@ class _RunReport:
 
 def assessed(result: "Result", check: bool) -> _RunReport:
     """Assess a result for its report; ``check`` runs the scenario again to test its repeatability."""
-    from ppafo.remedy_trials import tried
+    from ppafo.remedy_trials import verdict_of
     from ppafo.running import gains
 
     scenario = result.scenario
@@ -105,7 +105,7 @@ def assessed(result: "Result", check: bool) -> _RunReport:
     error = None if repeatability is None else repeatability.error
     if error is None and result.status.is_completed and scenario.motion.motion_kind.layout == VANE:
         error = result.error()
-    verdict = tried(scenario, result.tracking)
+    verdict = verdict_of(result)
     return _RunReport(result, repeatability, error, verdict, result.sentences(verdict), gains(scenario))
 
 

@@ -77,6 +77,11 @@ class Mark:
     style: Mapping[str, Any] = field(default_factory=dict)
 
 
+def dots(x: Any, y: Any, marker: str, label: str = "", colour: str = BLUE, **style: Any) -> Mark:
+    """Return points without a line [SI], with Matplotlib keywords."""
+    return Mark("line", x, y, label=label, colour=colour, style={"linestyle": "", "marker": marker, **style})
+
+
 @dataclass(frozen=True, slots=True)
 class Panel:
     """Panel of a figure.

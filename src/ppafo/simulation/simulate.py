@@ -85,7 +85,7 @@ class DeferredResult:
 class Result(RecordedResult):
     """Result of a finished run; ``versions`` are package versions, ``engine`` has step size and numbers of steps.
 
-    ``tries(scenario, verdict)`` returns the verdict with a remedy that was tried; without it remedies are untried.
+    ``tries(result)`` returns the verdict with a remedy that was tried; without it remedies are untried.
     """
 
     scenario: Scenario
@@ -184,7 +184,7 @@ class Result(RecordedResult):
     @in_own_units
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``run.json`` as plain data in SI units, except the fields added by storage."""
-        verdict = self.tracking if self.tries is None else self.tries(self.scenario, self.tracking)
+        verdict = self.tracking if self.tries is None else self.tries(self)
         return {
             "status": plain(self.status),
             "verdict": self.sentences(verdict),

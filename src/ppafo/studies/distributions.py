@@ -26,6 +26,14 @@ class Distribution:
         """Return the quantile [SI] at each probability, an array of any shape."""
         return np.asarray(_QUANTILES[self.kind](uniform, *self.numbers) - self.zero)
 
+    def fraction(self, value: float) -> float:
+        """Return the probability of a value [SI] of a (log-)uniform one; below 0 or above 1 beyond its bounds."""
+        low, high = self.numbers
+        level = value + self.zero
+        if self.kind == "log_uniform":
+            return math.log(level / low) / math.log(high / low) if level > 0.0 else -math.inf
+        return float((level - low) / (high - low))
+
 
 def _normal(uniform: Floats, mean: float, deviation: float) -> Any:
     from scipy.special import ndtri

@@ -152,7 +152,7 @@ def axis_or_distribution(entry: Mapping[str, Any], varied: VariedPath) -> Axis |
         values = _all_whole(path, tuple(_level("values", value, varied) for value in entry["values"]))
         return Axis(path, values) if kind == "list" else RandomValue(path, _choice(values, entry.get("weights", ())))
     if kind != "grid":
-        return RandomValue(path, _distribution({"minimum": 0, "maximum": LARGEST_SEED, **entry}, varied))
+        return RandomValue(path, distribution_in({"minimum": 0, "maximum": LARGEST_SEED, **entry}, varied))
     first, last = (_level(key, entry[key], varied) for key in ("first", "last"))
     if first == last:
         raise UnitError(f"first and last are both {entry['first']!r}; they must differ")
@@ -170,7 +170,7 @@ def _all_whole(path: str, values: tuple[float, ...]) -> tuple[float, ...]:
     return values
 
 
-def _distribution(entry: Mapping[str, Any], varied: VariedPath) -> Distribution:
+def distribution_in(entry: Mapping[str, Any], varied: VariedPath) -> Distribution:
     """Return the distribution of a ``[[vary]]`` table; UnitError for numbers that do not make one."""
     kind = entry["kind"]
     is_logarithmic = kind in ("log_uniform", "log_normal")

@@ -11,7 +11,7 @@ import pytest
 from ppafo.cli.main import main
 from ppafo.documents.toml_text import table_lines
 from ppafo.loading import load_scenario, reloaded, usage_text
-from ppafo.remedy_trials import tried
+from ppafo.remedy_trials import verdict_of
 from ppafo.simulation.simulate import simulate
 from ppafo.wording import read_by
 
@@ -66,7 +66,7 @@ def test_a_remedy_is_pasted_into_a_command_and_into_a_file_and_both_are_the_run_
 ) -> None:
     loaded = load_scenario(scenario, changes)
     with read_by("command line"):
-        verdict = tried(loaded, simulate(loaded).tracking)
+        verdict = verdict_of(simulate(loaded))
         assert verdict.fails
         assert verdict.mended
         (printed,) = re.findall(

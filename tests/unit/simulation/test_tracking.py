@@ -12,7 +12,7 @@ from ppafo.loading import load_scenario, reloaded
 from ppafo.metrics.metric import hold_start
 from ppafo.metrics.settled import SettledPart
 from ppafo.parameters.reach import supply_for, torque_reach
-from ppafo.remedy_trials import tried
+from ppafo.remedy_trials import verdict_of
 from ppafo.running import simulate
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.tracking import tracking_in
@@ -48,7 +48,7 @@ def test_a_torque_beyond_the_reach_is_said_and_a_file_may_say_why_it_asks_for_it
     # Gains that make the loop miss what it could reach are no purpose.
     assert simulate(TASK, ["reference.level=4 N m", "controller.proportional_gain=0.01"]).tracking.is_useless
     scenario = replace(load_scenario(TASK, ["reference.level=9 N m"]), beyond_reach="")
-    verdict = tried(scenario, simulate(scenario).tracking)
+    verdict = verdict_of(simulate(scenario))
     assert verdict.is_useless
     said = "with overrides=['supply.pressure=94.5 psi_g'] it follows, as a further run shows, with a margin"
     assert said in verdict.sentence
@@ -72,7 +72,7 @@ def test_a_walk_that_gives_half_of_the_requested_peak_does_not_follow_and_is_tol
     result = simulate(scenario)
     reach = 754.0 * scenario.device.actuator.settings["lever_length"]
     assert max(result["torque"]) < reach < 0.7 * max(result["reference"])
-    verdict = tried(scenario, result.tracking)
+    verdict = verdict_of(result)
     assert verdict.found.startswith("the torque does not follow its reference: missing peak torque ")
     assert "the controller requests more torque than the actuator gives" in verdict.sentence
     (limit,) = verdict.mended
@@ -232,7 +232,7 @@ def test_a_wave_cut_by_both_supplies_is_no_oscillation_and_is_given_both_pressur
 ) -> None:
     changes = [*LOCKED_LEVER, "reference.amplitude=10 N m", f"reference.frequency={frequency} Hz"]
     scenario = load_scenario("cylinder-servo", changes)
-    verdict = tried(scenario, simulate(scenario).tracking)
+    verdict = verdict_of(simulate(scenario))
     assert verdict.kind == "does not follow"
     gauge = float(scenario.device.supply.pressure - scenario.device.supply.atmospheric_pressure)
     # Bore of 32 mm and rod of 12 mm on an arm of 15 mm at 90 deg: the torque is in proportion to the gauge pressure.
@@ -263,7 +263,7 @@ def test_a_judged_part_without_a_peak_gives_no_verdict_and_a_slower_trial_is_lon
     assert np.isnan(judged[0])
     assert judged[1] == 0.0
     late = load_scenario("cylinder-servo", LATE_SINE)
-    verdict = tried(late, simulate(late).tracking)
+    verdict = verdict_of(simulate(late))
     # The delay of a sensor is reduced before the task is slower.
     assert verdict.mended == ("sensors.delay=1 ms",)
     slowest = verdict.remedies[-1].overrides
@@ -434,7 +434,7 @@ def test_a_wrong_set_up_is_told_its_cause_and_a_remedy_that_works(
     name: str, changes: list[str], cause: str, remedy: str
 ) -> None:
     scenario = load_scenario(name, changes)
-    verdict = tried(scenario, simulate(scenario).tracking)
+    verdict = verdict_of(simulate(scenario))
     assert verdict.fails
     assert cause in verdict.cause
     assert remedy in verdict.tried

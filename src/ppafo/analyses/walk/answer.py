@@ -11,7 +11,7 @@ from ppafo.analyses.walk.benefit import benefit_sentence
 from ppafo.documents.json_text import fields_of, plain
 from ppafo.loading import reloaded, usage_text
 from ppafo.metrics.strides import PER_STRIDE
-from ppafo.remedy_trials import tried
+from ppafo.remedy_trials import verdict_of
 from ppafo.report.finding import Column, Finding, Section, columns_of, facts
 from ppafo.report.kind import Kind
 from ppafo.simulation.gains import gains_of
@@ -102,7 +102,7 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
     scenario, motion, law = worn.scenario, walk_of(worn.scenario), law_of(worn.scenario)
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
     ended = f"{scenario.name}: {worn.status.kind}, {strides} of {motion.gait.name}"
-    verdict, gains = tried(scenario, worn.tracking), gains_of(scenario, law)
+    verdict, gains = verdict_of(worn), gains_of(scenario, law)
     cut_off = (walked for walked in (worn, comparison.without_device) if not walked.status.is_completed)
     said = [ended, *(f"{walked.scenario.name}: {walked.status.message}" for walked in cut_off)]
     said += [benefit_sentence(comparison), verdict.sentence, limited_request(scenario)]

@@ -11,7 +11,7 @@ from ppafo.analyses.tuning import (
     UNUSABLE,
     ObjectiveTerm,
     Problem,
-    SearchedParameter,
+    Robust,
     SearchEffort,
     agreement,
     judge,
@@ -22,7 +22,7 @@ from ppafo.studies.distributions import Distribution, Floats
 from ppafo.studies.draws import Uncertainty
 from ppafo.studies.limits import MetricLimit
 from ppafo.studies.study import RandomValue
-from ppafo.studies.varying import varied_path
+from ppafo.studies.varying import distribution_in, varied_path
 from ppafo.study.runs import Rows
 
 EFFORT = SearchEffort(starts=3, generations=200, candidates_per_gain=12, seed=4)
@@ -35,9 +35,8 @@ def problem(**changes: Any) -> Problem:
         "name": "trial",
         "description": "",
         "scenario": load_scenario("torque-task-proportional"),
-        "overrides": (),
         "searched": (),
-        "goals": (ObjectiveTerm("rms_error", 1.0, None),),
+        "goals": (ObjectiveTerm("rms_error"),),
         "constraints": (MetricLimit("gas_supplied", 0.5, True, "500 g"),),
         "effort": EFFORT,
     }
@@ -143,24 +142,21 @@ def test_a_run_without_the_metric_counts_as_failed() -> None:
 @pytest.mark.parametrize(("share", "deviations"), [(None, 2.0), (0.75, 0.0)])
 def test_candidates_are_judged_by_their_bad_end(share: float | None, deviations: float) -> None:
     drawn = Uncertainty((RandomValue("x", Distribution("normal", (0.0, 1.0))),))
-    given = problem(uncertainty=drawn, draws=5, deviations=deviations, fraction=share)
+    measure = Robust("x", "quantile", share=share) if share else Robust("x", deviations=deviations)
+    given = problem(uncertainty=drawn, draws=5, robust=measure)
     values = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
-    goals = (ObjectiveTerm("rms_error", 1.0, None), ObjectiveTerm("gas_supplied", -1.0, None))
+    goals = (ObjectiveTerm("rms_error"), ObjectiveTerm("gas_supplied", -1.0))
     judged = judge(runs([values.tolist()], [values.tolist()]), replace(given, goals=goals, constraints=()), SCALES)
     high = 4.0 if share else 3.0 + 2.0 * np.std(values, ddof=1)
     low = 2.0 if share else 3.0 - 2.0 * np.std(values, ddof=1)
     assert judged["objective"][0] == pytest.approx(high / 2.0 - low)
 
 
-def test_logarithmic_bounds_and_what_lies_at_them() -> None:
+def test_a_place_in_logarithmic_bounds_is_a_fraction() -> None:
     scenario = load_scenario("torque-task-proportional")
     place = varied_path("controller.proportional_gain", scenario)
-    item = SearchedParameter("controller.proportional_gain", 0.01, 1.0, True, 0.1, place)
-    assert item.value(np.array([0.0, 0.5, 1.0])) == pytest.approx([0.01, 0.1, 1.0])
-    assert item.fraction(0.1) == pytest.approx(0.5)
-    assert item.fraction(2.0) > 1.0
-    assert (item.bound_reached(0.0101), item.bound_reached(0.1), item.bound_reached(0.99)) == (
-        "minimum",
-        None,
-        "maximum",
-    )
+    ends = {"kind": "log_uniform", "minimum": "0.01 1/(N m)", "maximum": "1 1/(N m)"}
+    between = distribution_in(ends, place)
+    assert between.values(np.array([0.0, 0.5, 1.0])) == pytest.approx([0.01, 0.1, 1.0])
+    assert between.fraction(0.1) == pytest.approx(0.5)
+    assert between.fraction(2.0) > 1.0

@@ -135,7 +135,10 @@ def test_the_tunings_of_the_package_load_and_fit_the_published_schema() -> None:
         ({"surch": []}, "unknown key 'surch', did you mean 'search'"),
         ({"search": [DOCUMENT["search"][0]] * 2}, "'controller.proportional_gain' appears in two [[search]] tables"),
         ({"search": [DOCUMENT["search"][0] | {"minimum": "2 1/(N m)"}]}, "must be less than maximum"),
-        ({"search": [DOCUMENT["search"][0] | {"minimum": "0 1/(N m)", "spacing": "logarithmic"}]}, "a minimum above 0"),
+        (
+            {"search": [DOCUMENT["search"][0] | {"minimum": "0 1/(N m)", "spacing": "logarithmic"}]},
+            "minimum = '0 1/(N m)' must be above 0",
+        ),
         ({"search": [DOCUMENT["search"][0] | {"maximum": "1e9 1/(N m)"}]}, "at most 1000 1/(N m)"),
         (
             {
