@@ -14,9 +14,10 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.units.shown import shown_in
 
 if TYPE_CHECKING:
-    from ppafo.simulation.at_hand import RecordedResult
+    from ppafo.simulation.simulate import Result
     from ppafo.simulation.tracking import Tracking
     from ppafo.simulation.tracking.remedies import Remedy
+    from ppafo.walking.result import WalkResult
 
 MOST_TRIED = 18
 """Largest number of remedies simulated for a verdict."""
@@ -26,7 +27,7 @@ _LESS_ERROR = 0.5
 """Remaining error divided by the original one, below which a remedy that does not suffice is reported [-]."""
 
 
-def verdict_of(result: "RecordedResult") -> "Tracking":
+def verdict_of(result: "Result | WalkResult") -> "Tracking":
     """Return the tracking verdict on a run, with the first remedy that succeeds in a simulation.
 
     Remedies are the overrides named in the verdict. If only a remedy of a less certain cause succeeds, that cause

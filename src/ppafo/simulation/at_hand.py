@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ppafo.metrics.metric import Metric
-    from ppafo.simulation.tracking import Tracking
 
 
 in_own_units = in_units(lambda result, *_, **__: result.scenario.device.shown)
@@ -43,10 +42,6 @@ class RecordedResult:
         @property
         def status(self) -> Any:
             """End of the run: a ``Status``."""
-
-        @property
-        def tracking(self) -> "Tracking":
-            """Verdict on the run."""
 
         def _figure(self) -> "Figure":
             """Return the figure of the run."""
