@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from ppafo.analyses import ask, np
 from ppafo.arguments import Confidence, MaximumFailed, Name, Overrides, Seed, Tasks, Threads, Whole, Word, checked
 from ppafo.errors import StudyError
 from ppafo.plugins import Plugins, name_plugins
@@ -17,27 +18,16 @@ from ppafo.units.shown import shown_in
 from ppafo.wording import argument_text, count_of, first_twice, known_names, said_of_configuration, without_exponent
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from ppafo.metrics import Metric
-    from ppafo.report.finding import Column, Finding, Section
-    from ppafo.report.kind import ConfidenceInterval
-    from ppafo.report.panels import Panel
+    from ppafo.report.finding import Finding
     from ppafo.simulation.scenario import Scenario
-    from ppafo.simulation.simulate import Result, Status
-    from ppafo.simulation.tracking import Tracking
-    from ppafo.studies.distributions import Floats
-    from ppafo.studies.draws import Uncertainty
     from ppafo.studies.study import Study
-    from ppafo.study.runs import Rows
 
 Configured = Annotated[
     "Mapping[str, Scenario | str | Path] | Sequence[Scenario | str | Path]", Word("SCENARIO", is_repeated=True)
 ]
 StudyLike = Annotated["Study | str | Path | Mapping[str, Any]", Word("STUDY", option="--study")]
-DrawnRuns = tuple["Rows", str, "Floats"]
-"""Rows of runs over draws, the reason why the first of them failed, and the verdict on each draw."""
 AS_WRITTEN = "as written"
 """Task name of scenarios that run as written, without overrides of a task."""
 DEFAULT_DRAWS = 4096
@@ -45,21 +35,6 @@ DEFAULT_DRAWS = 4096
 _SAME = 1.0e-9
 """Relative difference up to which two values count as equal."""
 _GAS = "gas_supplied"
-_COMPARED = {
-    _GAS: -1,
-    "mechanical_work": 0,
-    "gas_per_work": -1,
-    "switchings": -1,
-    "peak_torque": 0,
-    "command_reversals": 0,
-    "gas": -1,
-    "positive_push_off_work": 1,
-    "net_push_off_work": 1,
-    "push_off_error": -1,
-    "torque_error": -1,
-    "toe_clearance": 1,
-}
-"""Metrics that are compared beside the errors: -1 if smaller is better, 1 if larger is better, 0 if neither."""
 _OUTER_QUANTILES = (0.05, 0.95)
 """Quantiles over the draws that tables show next to the median."""
 _READING = (
@@ -99,14 +74,14 @@ class PairedMetric:
     """
 
     pairs: int
-    difference: ConfidenceInterval
+    difference: ask.ConfidenceInterval
     change: float
     change_low: float
     change_high: float
-    better: ConfidenceInterval | None
+    better: ask.ConfidenceInterval | None
     equal: float
     effective_size: float
-    noise: ConfidenceInterval | None = None
+    noise: ask.ConfidenceInterval | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,27 +90,26 @@ class ComparedCase:
 
     - ``verdict``: end of the nominal run in a word; ``tracking``: how it follows, with a tried remedy
     - ``follows``: True if the nominal run completes and follows its reference, or misses it only as announced
-    - ``failed``, ``reason``: number of draws whose run failed, and reason of the first failure
+    - ``failed``: number of draws whose run failed
     - ``following``: number of draws whose run does so too; None without a verdict on any
     - ``is_on_front``: True if the case follows and no other that follows beats it in both error and gas
     - ``pairs``: statistics against the baseline by metric, ``best``: probability of being the best; empty without draws
-    - ``rows``: runs over the draws; None without
+    - ``rows``: runs over the draws, by column; empty without
     """
 
     configuration: str
-    status: Status
+    status: ask.Status
     verdict: str
     follows: bool
-    tracking: Tracking
-    metrics: Mapping[str, Metric]
+    tracking: ask.Tracking
+    metrics: Mapping[str, ask.Metric]
     failed: int
     following: int | None
     is_on_front: bool
     pairs: dict[str, PairedMetric]
-    best: dict[str, ConfidenceInterval]
-    reason: str = field(compare=False)
+    best: dict[str, ask.ConfidenceInterval]
     scenario: Scenario = field(compare=False, repr=False)
-    rows: Rows | None = field(compare=False, repr=False)
+    rows: ask.Rows = field(compare=False, repr=False)
 
     def value(self, metric: str) -> float:
         """Return a metric [SI] of the nominal run; nan if the run does not have the metric."""
@@ -225,42 +199,33 @@ def compare(
     [('torque-task-proportional', '0.869 N m'), ('torque-task-solenoid', '1.026 N m')]
     """
     name_plugins(plugins)
-    from ppafo.arguments.values import taken_tasks
-    from ppafo.metrics import METRICS
-    from ppafo.metrics.tracking import ONE_INSTANT, TRACKING
-    from ppafo.simulation.ensemble.running import lacking
-    from ppafo.simulation.numbers import NOISE_SEED
-    from ppafo.simulation.simulate import simulate_many
-    from ppafo.studies.draws import FEWEST_DRAWS, MAXIMUM_DRAWS, Uncertainty, study_of, uncertainty_of
-    from ppafo.studies.study import DEFAULT_SEED, changes_of, choose_configurations, configurations_with
-
     count = DEFAULT_DRAWS if draws is None else draws
-    if not FEWEST_DRAWS <= count <= MAXIMUM_DRAWS:
-        raise StudyError(f"draws = {count!r}: must be at least {FEWEST_DRAWS} and at most {MAXIMUM_DRAWS:,}")
-    loaded = study_of(study) if study is not None else None
-    chosen = choose_configurations(configurations or None, loaded, overrides)
+    if not ask.FEWEST_DRAWS <= count <= ask.MAXIMUM_DRAWS:
+        raise StudyError(f"draws = {count!r}: must be at least {ask.FEWEST_DRAWS} and at most {ask.MAXIMUM_DRAWS:,}")
+    loaded = ask.study_of(study) if study is not None else None
+    chosen = ask.choose_configurations(configurations or None, loaded, overrides)
     names = [configuration.name for configuration in chosen]
     if baseline is not None and baseline not in names:
         raise StudyError(f"baseline: there is no configuration '{baseline}'{known_names(baseline, names)}")
-    named_tasks = list(taken_tasks(tasks)) or [(AS_WRITTEN, ())]
+    named_tasks = list(ask.taken_tasks(tasks)) or [(AS_WRITTEN, ())]
     if (repeated := first_twice([name for name, _ in named_tasks])) is not None:
         raise StudyError(f"two tasks are named '{repeated}'; give every task a different name")
     scenarios = {
         (task, configuration.name): configuration.scenario
         for task, of_task in named_tasks
-        for configuration in configurations_with(chosen, of_task)
+        for configuration in ask.configurations_with(chosen, of_task)
     }
     # The error of the controlled quantity first (of a walk the last), and what the study asks for.
-    errors = [*(name for name in TRACKING if name.startswith("rms_") and name.endswith("_error")), "torque_error"]
+    errors = [*(name for name in ask.TRACKING if name.startswith("rms_") and name.endswith("_error")), "torque_error"]
     asked = () if loaded is None else loaded.outputs.metrics
-    better = {name: -1 for name in TRACKING if name not in ONE_INSTANT} | _COMPARED
+    compared = (name for name, kind in ask.METRICS.items() if kind.better is not None)
     # Without a reference there is no error.
     lacks = {
-        name: any(lacking(scenario, METRICS[name]) for scenario in scenarios.values())
-        for name in dict.fromkeys((*errors, *asked, *better))
+        name: any(ask.lacking(scenario, ask.METRICS[name]) for scenario in scenarios.values())
+        for name in dict.fromkeys((*errors, *asked, *compared))
     }
-    metrics = {name: better.get(name, 0) for name, is_lacking in lacks.items() if not is_lacking}
-    distributions = Uncertainty(()) if loaded is None or not loaded.paths else uncertainty_of(loaded)
+    metrics = {name: ask.METRICS[name].better or 0 for name, is_lacking in lacks.items() if not is_lacking}
+    distributions = ask.Uncertainty(()) if loaded is None or not loaded.paths else ask.uncertainty_of(loaded)
     uncertainty = distributions.with_noise_of(scenarios.values())
     if not uncertainty.drawn and draws is not None:
         raise StudyError(
@@ -269,10 +234,10 @@ def compare(
     if loaded is not None:
         _check_different_values(loaded, scenarios)
     if seed is None:
-        seed = DEFAULT_SEED if loaded is None else loaded.sample.seed
+        seed = ask.DEFAULT_SEED if loaded is None else loaded.sample.seed
     drawn = _drawn_runs(scenarios, [*metrics], loaded, uncertainty, (count, seed, maximum_failed), threads, progress)
     # Nominal runs use the seed of each scenario: with noise, a nominal run is one realisation of the noise.
-    nominal = dict(zip(scenarios, simulate_many(list(scenarios.values()), threads), strict=True))
+    nominal = dict(zip(scenarios, ask.simulate_many(list(scenarios.values()), threads), strict=True))
     error = next((name for name in metrics if name in errors), "")
     found = ComparisonResult(
         units="SI: N m, kg, J; fractions from 0 to 1",
@@ -281,7 +246,7 @@ def compare(
         draws=count if drawn else 0,
         seed=seed if drawn else 0,
         remarks=[],
-        varied=[path for path in uncertainty.paths if path != NOISE_SEED],
+        varied=[path for path in uncertainty.paths if path != ask.NOISE_SEED],
         has_noise=bool(drawn) and uncertainty.has_noise,
         confidence=confidence,
         error=error,
@@ -290,8 +255,7 @@ def compare(
         tasks={},
     )
     for task, _ in named_tasks:
-        runs = {name: (nominal[task, name], *drawn.get((task, name), (None, "", None))) for name in names}
-        found.tasks[task] = _cases(found, runs)
+        found.tasks[task] = _cases(found, {name: (nominal[task, name], drawn.get((task, name))) for name in names})
     remarks = [
         *(f"outputs: '{name}' is left out: not every configuration has this metric" for name in asked if lacks[name]),
         *_remarks(found),
@@ -303,24 +267,23 @@ def compare(
         )
     device = next(iter(scenarios.values()))
     with shown_in(device.device.shown if loaded is None else loaded.shown_for(device)):
-        changes = changes_of(chosen, None if configurations else loaded, overrides)
+        changes = ask.changes_of(chosen, None if configurations else loaded, overrides)
         return _finding(replace(found, remarks=remarks), check, changes)
 
 
 def _check_different_values(study: Study, scenarios: Mapping[tuple[str, str], Scenario]) -> None:
     """Raise StudyError for a path that the study draws once for scenarios whose declared values differ."""
-    from ppafo.simulation.numbers import NOISE_SEED
-    from ppafo.studies.varying import value_at, varied_path
-
     for path in study.paths:
         # Orifices of different valves are meant to differ: what the study draws replaces the value of each.
-        if path.startswith("valve.") or path == NOISE_SEED:
+        if path.startswith("valve.") or path == ask.NOISE_SEED:
             continue
-        declared = [value_at(path, scenario) for (_, name), scenario in scenarios.items() if study.varies(path, name)]
+        declared = [
+            ask.value_at(path, scenario) for (_, name), scenario in scenarios.items() if study.varies(path, name)
+        ]
         values = [value for value in declared if value is not None]
         lowest, highest = min(values, default=0.0), max(values, default=0.0)
         if highest - lowest > _SAME * max(abs(lowest), abs(highest)):
-            varied = varied_path(path, next(iter(scenarios.values())))
+            varied = ask.varied_path(path, next(iter(scenarios.values())))
             raise StudyError(
                 f"the study draws '{path}' for every configuration, so the values {varied.quote(lowest)} and "
                 f"{varied.quote(highest)} of the configurations would be ignored; use a study that does not draw "
@@ -332,106 +295,83 @@ def _drawn_runs(
     scenarios: Mapping[tuple[str, str], Scenario],
     metrics: Sequence[str],
     study: Study | None,
-    uncertainty: Uncertainty,
+    uncertainty: ask.Uncertainty,
     draws: tuple[int, int, float],
     threads: int | None,
     progress: Report | None,
-) -> dict[tuple[str, str], DrawnRuns]:
+) -> dict[tuple[str, str], ask.Rows]:
     """Return the runs of every scenario over the same draws; StudyError if too many of them fail.
 
     ``draws`` are their number, the seed, and the fraction that may fail. With sensor noise the first draws are repeated
     behind the others, with another noise.
     """
-    import numpy as np
-
-    from ppafo.simulation.numbers import NOISE_SEED
-    from ppafo.studies.sampling import with_new_noise
-    from ppafo.study.blocks import unvaried
-    from ppafo.study.runs import RunCounter, scenario_runs
-
     if not uncertainty.drawn:
         return {}
     count, seed, maximum_failed = draws
-    columns, drawn = uncertainty.replicated_columns(count, seed), dict[tuple[str, str], DrawnRuns]()
+    columns, drawn = uncertainty.replicated_columns(count, seed), dict[tuple[str, str], ask.Rows]()
     if uncertainty.has_noise:
-        again = with_new_noise(columns)
+        again = ask.with_new_noise(columns)
         columns = {path: np.concatenate([column, again[path]]) for path, column in columns.items()}
-    counter = RunCounter(max(map(len, columns.values())) * len(scenarios), progress)
+    counter = ask.RunCounter(max(map(len, columns.values())) * len(scenarios), progress)
     for (task, name), scenario in scenarios.items():
-        runs = scenario_runs(scenario, metrics, counter, uncertainty.gauge, threads)
+        runs = ask.scenario_runs(scenario, metrics, counter, uncertainty.gauge, threads)
         # The noise is in all configurations, even if the study varies other paths in some of them only.
-        paths = [path for path in columns if study is None or path == NOISE_SEED or study.varies(path, name)]
-        varied = {path: columns[path] for path in paths} or unvaried(scenario, count)
-        rows = runs.run(varied)
+        paths = [path for path in columns if study is None or path == ask.NOISE_SEED or study.varies(path, name)]
+        rows = runs.run({path: columns[path] for path in paths} or ask.unvaried(scenario, count))
         first = {metric: values[:count] for metric, values in rows.items()}
         runs.check(first, maximum_failed, f"configuration '{name}', task '{task}'")
-        drawn[task, name] = rows, runs.reason, first["passes"]
+        drawn[task, name] = rows
     return drawn
 
 
-def _cases(
-    found: ComparisonResult, runs: Mapping[str, tuple[Result, Rows | None, str, Floats | None]]
-) -> list[ComparedCase]:
-    """Return the cases of a task, from the nominal run and the drawn runs of each configuration.
-
-    The remedy of a nominal run that does not follow its reference is tried.
-    """
-    import numpy as np
-
-    from ppafo.remedy_trials import verdict_of
-    from ppafo.study.runs import FAILED
-
-    cases, draws = list[ComparedCase](), found.draws
-    for name, (nominal, rows, reason, verdicts) in runs.items():
-        status = nominal.status
+def _cases(found: ComparisonResult, runs: Mapping[str, tuple[ask.Result, ask.Rows | None]]) -> list[ComparedCase]:
+    """Return the cases of a task, from the nominal run and the drawn runs of each configuration."""
+    cases, draws, base = list[ComparedCase](), found.draws, runs[found.baseline][1]
+    for name, (nominal, rows) in runs.items():
         with said_of_configuration(name):
-            tracking = verdict_of(nominal)
-        follows = status.is_completed and not tracking.is_useless
-        word: str = status.kind
-        if tracking.fails and status.is_completed:
+            tracking = ask.verdict_of(nominal)
+        is_completed, pairs = nominal.status.is_completed, dict[str, PairedMetric]()
+        follows, word = is_completed and not tracking.is_useless, str(nominal.status.kind)
+        if tracking.fails and is_completed:
             word = "beyond reach" if follows else tracking.kind
-        base, pairs = runs[found.baseline][1], dict[str, PairedMetric]()
-        for metric, better in found.metrics.items() if name != found.baseline else ():
-            if base is None or rows is None:
-                continue
+        if base is not None and rows is not None and name != found.baseline:
             # Without a pair of values a metric has no statistics.
-            if pair := compare_pairs(base[metric], rows[metric], better, found.confidence, draws):
-                pairs[metric] = pair
-        is_known = verdicts is not None and np.isfinite(verdicts).any()
+            for metric, better in found.metrics.items():
+                if pair := compare_pairs(base[metric], rows[metric], better, found.confidence, draws):
+                    pairs[metric] = pair
+        first = {} if rows is None else {metric: values[:draws] for metric, values in rows.items()}
+        passes = first.get("passes", np.zeros(0))
         case = ComparedCase(
             configuration=name,
-            status=status,
+            status=nominal.status,
             verdict=word,
             follows=follows,
             tracking=tracking,
             metrics={metric: value for metric, value in nominal.metrics.items() if metric in found.metrics},
-            failed=0 if rows is None else int(rows[FAILED][:draws].sum()),
-            following=int(np.count_nonzero(verdicts == 1.0)) if is_known else None,
+            failed=int(np.count_nonzero(first.get(ask.FAILED, 0))),
+            following=int(np.count_nonzero(passes == 1.0)) if np.isfinite(passes).any() else None,
             is_on_front=False,
             pairs=pairs,
             best={},
-            reason=reason,
             scenario=nominal.scenario,
-            rows=None if rows is None else {metric: values[:draws] for metric, values in rows.items()},
+            rows=first,
         )
         cases.append(case)
     # A case that does not follow its reference is not among the best.
     following = [case for case in cases if case.follows]
     points = np.array([[case.value(name) for name in (found.error, _GAS)] for case in following]).reshape(-1, 2)
     front = dict(zip([case.configuration for case in following], pareto_front(points).tolist(), strict=True))
-    drawn = [case.rows for case in following if case.rows is not None]
-    for metric, better in found.metrics.items() if drawn else ():
+    for metric, better in found.metrics.items() if draws else ():
         # All at once: no pair says which of three is the best. Empty where no draw has a value of all.
-        shares = best_probabilities([rows[metric] for rows in drawn], better, found.confidence) if better else []
+        values = [case.rows[metric] for case in following]
+        shares = best_probabilities(values, better, found.confidence) if better and values else []
         for case, share in zip(following, shares, strict=False):
             case.best[metric] = share
     return [replace(case, is_on_front=front.get(case.configuration, False)) for case in cases]
 
 
-def pareto_front(points: Floats) -> NDArray[Any]:
+def pareto_front(points: ask.Floats) -> NDArray[Any]:
     """Return a mask of the points (points, goals) that no other point dominates; every goal is minimised."""
-    import numpy as np
-
     front = np.zeros(len(points), dtype=np.bool_)
     for row, point in enumerate(points):
         if np.all(np.isfinite(point)):
@@ -441,8 +381,8 @@ def pareto_front(points: Floats) -> NDArray[Any]:
 
 
 def compare_pairs(
-    baseline: Floats,
-    other: Floats,
+    baseline: ask.Floats,
+    other: ask.Floats,
     better: int,
     confidence: float,
     draws: int | None = None,
@@ -453,11 +393,6 @@ def compare_pairs(
     first draws, repeated with other noise. ``better`` is -1 if a smaller value is better, 1 if a larger value is
     better, 0 if neither. A draw with equal values counts for neither configuration.
     """
-    import numpy as np
-
-    from ppafo.studies.draws import REPLICATES
-    from ppafo.studies.intervals import effective_sample_size, noise_interval, replicates_interval, share_interval
-
     all_runs, baseline, other = other - baseline, baseline[:draws], other[:draws]
     both = np.isfinite(baseline) & np.isfinite(other)
     baseline_values, other_values = baseline[both], other[both]
@@ -473,38 +408,30 @@ def compare_pairs(
     wins = np.where(both, better * difference > 0.0, np.nan)
     return PairedMetric(
         pairs=baseline_values.size,
-        difference=replicates_interval(difference, REPLICATES, confidence),
+        difference=ask.replicates_interval(difference, ask.REPLICATES, confidence),
         change=float(middle),
         change_low=float(low),
         change_high=float(high),
-        better=share_interval(wins, REPLICATES, confidence) if better else None,
+        better=ask.share_interval(wins, ask.REPLICATES, confidence) if better else None,
         equal=float(np.mean(baseline_values == other_values)),
-        effective_size=effective_sample_size(other_values - baseline_values),
-        noise=noise_interval(difference, repeated, confidence) if repeated.size else None,
+        effective_size=ask.effective_sample_size(other_values - baseline_values),
+        noise=ask.noise_interval(difference, repeated, confidence) if repeated.size else None,
     )
 
 
-def best_probabilities(values: Sequence[Floats], better: int, confidence: float) -> list[ConfidenceInterval]:
+def best_probabilities(values: Sequence[ask.Floats], better: int, confidence: float) -> list[ask.ConfidenceInterval]:
     """Return the probability of each configuration to be the best in a draw; a tie counts for all of the best."""
-    import numpy as np
-
-    from ppafo.studies.draws import REPLICATES
-    from ppafo.studies.intervals import share_interval
-
     table = better * np.stack(values)
     known = np.all(np.isfinite(table), axis=0)
     if not known.any():
         return []
     # Draws in which one has no value say nothing about which is the best.
     is_best = np.where(known, table == np.max(table, axis=0), np.nan)
-    return [share_interval(row, REPLICATES, confidence) for row in is_best]
+    return [ask.share_interval(row, ask.REPLICATES, confidence) for row in is_best]
 
 
 def _remarks(found: ComparisonResult) -> list[str]:
     """Return remarks on differing tasks, failed runs, means that depend on few draws, and noise."""
-    from ppafo.simulation.gains import remark_on_following_gains
-    from ppafo.studies.intervals import is_carried
-
     remarks, failed, uncertain = [], [], []
     for task, cases in found.tasks.items():
         followed = {case.configuration: (case.scenario.reference, case.scenario.run.duration) for case in cases}
@@ -519,7 +446,7 @@ def _remarks(found: ComparisonResult) -> list[str]:
         for case in cases:
             where = f"{case.configuration}, {task}"
             with said_of_configuration(case.configuration):
-                remarks.append(remark_on_following_gains(case.scenario, found.varied))
+                remarks.append(ask.remark_on_following_gains(case.scenario, found.varied))
                 if kept := case.scenario.origin.replaced:
                     remarks.append(f"{where}: {kept}")
                 if not case.follows:
@@ -529,14 +456,14 @@ def _remarks(found: ComparisonResult) -> list[str]:
             if case.failed:
                 failed.append(
                     f"{where}: {case.failed:,} of {found.draws:,} draws failed and are left out of every pair; the "
-                    f"first: {case.reason}"
+                    f"first: {next(filter(None, case.rows['reason']), '')}"
                 )
             uncertain += [
                 f"{case.configuration}, task '{task}': the mean difference of {metric} has an effective sample size "
                 f"of {pair.effective_size:.3g} of {pair.pairs:,} draws: do not trust its interval; the probability of "
                 "being better is not affected"
                 for metric, pair in case.pairs.items()
-                if not is_carried(pair.effective_size, pair.pairs)
+                if not ask.is_carried(pair.effective_size, pair.pairs)
             ]
     # Several tasks may have the same remark.
     return [*dict.fromkeys(filter(None, remarks)), *failed, *uncertain, *([_NOISE] if found.has_noise else [])]
@@ -547,8 +474,6 @@ def _finding(found: ComparisonResult, check: bool, overrides: Sequence[str]) -> 
 
     Panels are made by functions with a name, since a lambda in a report cannot be pickled.
     """
-    from ppafo.report.finding import Finding, Section
-
     names, cases = found.configurations, [case for of_task in found.tasks.values() for case in of_task]
     lead = f"{len(names)} configurations on {count_of(len(found.tasks), 'task')}, baseline {found.baseline}; "
     if not found.draws:
@@ -559,10 +484,10 @@ def _finding(found: ComparisonResult, check: bool, overrides: Sequence[str]) -> 
         beside = " and of the sensor noise" if found.has_noise else ""
         lead += f"{found.draws:,} draws of {count_of(len(found.varied), 'uncertain value')}{beside}, the same for all; "
         lead += f"each interval with {100.0 * found.confidence:g} % confidence"
-    pareto = Section(
+    pareto = ask.Section(
         "Error against gas", panels=partial(_front_panels, found), name="pareto", caption=_PARETO, is_detail=True
     )
-    change = Section(
+    change = ask.Section(
         "Spread of the change",
         panels=partial(_change_panels, found),
         name="change",
@@ -571,7 +496,7 @@ def _finding(found: ComparisonResult, check: bool, overrides: Sequence[str]) -> 
         size=(3.0, 2.5),
         is_detail=True,
     )
-    return Finding(
+    return ask.Finding(
         name="compare",
         kicker="Comparison",
         title=" and ".join(names) if len(names) == 2 else f"{len(names)} configurations against {found.baseline}",
@@ -580,8 +505,8 @@ def _finding(found: ComparisonResult, check: bool, overrides: Sequence[str]) -> 
             *(part for task in found.tasks for part in _tables(found, task)),
             *([pareto] if found.error else []),
             *([change] if found.error and found.draws else []),
-            Section(remarks=found.remarks),
-            Section("How to read it", said=[_READING], is_detail=True) if found.draws else Section(),
+            ask.Section(remarks=found.remarks),
+            ask.Section("How to read it", said=[_READING], is_detail=True) if found.draws else ask.Section(),
         ),
         found=found,
         passed=all(case.status.is_completed and (case.follows or not check) for case in cases),
@@ -589,20 +514,16 @@ def _finding(found: ComparisonResult, check: bool, overrides: Sequence[str]) -> 
     )
 
 
-def _tables(found: ComparisonResult, task: str) -> list[Section]:
+def _tables(found: ComparisonResult, task: str) -> list[ask.Section]:
     """Return the tables of a task: metrics, changes against the baseline, probability of being the best."""
-    from ppafo.report.finding import Column, Section
-    from ppafo.report.kind import Kind, of_metric
-    from ppafo.simulation.gains import gains_of
-
     cases, where = found.tasks[task], "" if len(found.tasks) == 1 else f", {task}"
     # A column without any number, such as the error of a hold that no task has, says nothing.
     held = (name for name in found.metrics if not all(math.isnan(case.value(name)) for case in cases))
-    kinds = {name: of_metric(name) for name in held}
+    kinds = {name: ask.of_metric(name) for name in held}
     following, best = [case for case in cases if case.follows], list[str]()
     for metric in (name for name in kinds if name in (found.error, _GAS)):
         shares = [
-            f"{case.configuration} {Kind(form='.4g').interval(case.best[metric])}"
+            f"{case.configuration} {ask.Kind(form='.4g').interval(case.best[metric])}"
             for case in following
             if metric in case.best
         ]
@@ -615,41 +536,37 @@ def _tables(found: ComparisonResult, task: str) -> list[Section]:
             best.append(f"best: {metric}: {named} ({kinds[metric].text(least)})")
     follow = ["-" if case.following is None else f"{case.following:,} of {found.draws:,}" for case in cases]
     laws = ((case, case.scenario.law) for case in cases)
-    gains = ((case, gains_of(case.scenario, law)) for case, law in laws if law is not None)
+    gains = ((case, ask.gains_of(case.scenario, law)) for case, law in laws if law is not None)
     return [
-        Section(
+        ask.Section(
             f"Task: {task}",
             [
-                Column("configuration", [case.configuration for case in cases]),
-                *(Column(kind.words, [case.value(name) for case in cases], kind) for name, kind in kinds.items()),
-                Column("status", [case.verdict for case in cases]),
-                *([Column("draws that follow", follow)] if found.draws else []),
+                ask.Column("configuration", [case.configuration for case in cases]),
+                *(ask.Column(kind.words, [case.value(name) for case in cases], kind) for name, kind in kinds.items()),
+                ask.Column("status", [case.verdict for case in cases]),
+                *([ask.Column("draws that follow", follow)] if found.draws else []),
             ],
             remarks=[f"{case.configuration}: {used.sentence}" for case, used in gains if used is not None],
         ),
         *(
-            Section(f"{case.configuration} against {found.baseline}{where}", _paired(found, cases, case))
+            ask.Section(f"{case.configuration} against {found.baseline}{where}", _paired(found, cases, case))
             for case in cases
             if case.pairs
         ),
-        *([Section(remarks=best)] if best else []),
+        *([ask.Section(remarks=best)] if best else []),
     ]
 
 
-def _paired(found: ComparisonResult, cases: Sequence[ComparedCase], case: ComparedCase) -> list[Column]:
+def _paired(found: ComparisonResult, cases: Sequence[ComparedCase], case: ComparedCase) -> list[ask.Column]:
     """Return the columns of a table with a row for each metric: change, mean difference, probability of improvement."""
-    from ppafo.report.finding import columns_of
-    from ppafo.report.kind import Kind, of_metric
-    from ppafo.studies.intervals import fraction_text
-
     base = next(each for each in cases if each.configuration == found.baseline)
     rows = []
     for metric, pair in case.pairs.items():
-        kind, low, high = of_metric(metric, "+.3g"), _percent(pair.change_low), _percent(pair.change_high)
+        kind, low, high = ask.of_metric(metric, "+.3g"), _percent(pair.change_low), _percent(pair.change_high)
         # A value that is zero within the accuracy of a run has no percentage.
         scale = abs(kind.shown_change(base.value(metric)))
         away = kind.shown_change(case.value(metric) - base.value(metric))
-        better = "-" if pair.better is None else Kind(form=".4g").interval(pair.better)
+        better = "-" if pair.better is None else ask.Kind(form=".4g").interval(pair.better)
         row = (
             metric,
             kind.shown_unit if kind.quantity else "",
@@ -658,11 +575,11 @@ def _paired(found: ComparisonResult, cases: Sequence[ComparedCase], case: Compar
             kind.change_interval(pair.difference),
             "equal in all" if pair.better is not None and pair.equal == 1.0 else better,
         )
-        noise = "-" if pair.noise is None else fraction_text(pair.noise)
+        noise = "-" if pair.noise is None else ask.fraction_text(pair.noise)
         rows.append((*row, noise) if found.has_noise else row)
     titles = ("metric", "unit", "nominal change", "change over the draws: median (5 to 95 %)", "mean difference")
     probable = ("probability of being better", *(["spread due to noise"] if found.has_noise else []))
-    return columns_of((*titles, *probable), rows)
+    return ask.columns_of((*titles, *probable), rows)
 
 
 def _percent(fraction: float) -> str:
@@ -671,97 +588,82 @@ def _percent(fraction: float) -> str:
 
 def _colours(cases: Sequence[ComparedCase]) -> dict[str, str]:
     """Return a colour for each configuration: colours of the valves if all differ, else of the palette in order."""
-    from ppafo.report.style import COLOURS, look_of_valve
-
-    colours = [look_of_valve(case.scenario.device.valve.kind).colour for case in cases]
+    colours = [ask.look_of_valve(case.scenario.device.valve.kind).colour for case in cases]
     if len(set(colours)) < len(colours):
-        colours = [COLOURS[row % len(COLOURS)] for row in range(len(colours))]
+        colours = [ask.COLOURS[row % len(ask.COLOURS)] for row in range(len(colours))]
     return dict(zip((case.configuration for case in cases), colours, strict=True))
 
 
-def _front_panels(found: ComparisonResult) -> list[Panel]:
+def _front_panels(found: ComparisonResult) -> list[ask.Panel]:
     """Return a panel for each task of error over gas: a mark for each completed case, a dot for each draw."""
-    import numpy as np
-
-    from ppafo.report.kind import of_metric
-    from ppafo.report.panels import Mark, Panel
-    from ppafo.report.style import GREY
-
     panels = []
     for task, cases in found.tasks.items():
         colours, marks, completed = _colours(cases), [], [case for case in cases if case.status.is_completed]
         for number, case in enumerate(completed):
             colour, marker = colours[case.configuration], _MARKS[number % len(_MARKS)]
-            if case.rows is not None:
-                dots = {"linestyle": "", "marker": ".", "alpha": 0.35, "markersize": 4, "markeredgewidth": 0}
+            if case.rows:
                 gas, error = (case.rows[name][:_MAXIMUM_DOTS] for name in (_GAS, found.error))
-                marks.append(Mark("line", gas, error, colour=colour, style=dots))
-            style = {"linestyle": "", "marker": marker, "markersize": 8, "markeredgecolor": "white"}
+                marks.append(ask.dots(gas, error, ".", "", colour, alpha=0.35, markersize=4, markeredgewidth=0))
             x, y = ([case.value(name)] for name in (_GAS, found.error))
-            marks.append(Mark("line", x, y, label=case.configuration, colour=colour, style=style))
+            marks.append(ask.dots(x, y, marker, case.configuration, colour, markersize=8, markeredgecolor="white"))
         # From left to right, so that the front is a line and no zigzag.
         front = sorted((case.value(_GAS), case.value(found.error)) for case in completed if case.is_on_front)
         x_front, y_front = np.array(front).reshape(-1, 2).T
-        marks.append(Mark("line", x_front, y_front, colour=GREY, style={"linewidth": 1.0, "zorder": 1}))
+        marks.append(ask.Mark("line", x_front, y_front, colour=ask.GREY, style={"linewidth": 1.0, "zorder": 1}))
         title = f"Task: {task}" if len(found.tasks) > 1 else ""
-        panels.append(Panel(of_metric(_GAS), of_metric(found.error), marks, title, legend="inside"))
+        panels.append(ask.Panel(ask.of_metric(_GAS), ask.of_metric(found.error), marks, title, legend="inside"))
     return panels
 
 
-def _change_panels(found: ComparisonResult) -> list[Panel]:
+def _change_panels(found: ComparisonResult) -> list[ask.Panel]:
     return [_change(found, task, metric) for task in found.tasks for metric in (found.error, _GAS)]
 
 
-def _change(found: ComparisonResult, task: str, metric: str) -> Panel:
+def _change(found: ComparisonResult, task: str, metric: str) -> ask.Panel:
     """Return a panel with histograms of the change of a metric against the baseline; dashed: nominal device."""
-    import numpy as np
-
-    from ppafo.report.kind import Kind, of_metric
-    from ppafo.report.panels import Mark, Panel
-    from ppafo.report.style import BLACK
-
     cases, marks, ends = found.tasks[task], [], list[float]()
     colours = _colours(cases)
     base = next(case for case in cases if case.configuration == found.baseline)
     for case in cases:
-        if case is base or case.rows is None or base.rows is None:
-            continue
-        change = _relative(base.rows[metric], case.rows[metric])
+        change = _relative(base.rows[metric], case.rows[metric]) if case is not base else np.zeros(0)
         if change.size == 0:
             continue
         colour, (low, high) = colours[case.configuration], np.percentile(change, _SHOWN_PERCENTILES)
         # Fewer bins for fewer draws, so that each has some of them.
         counts, edges = np.histogram(change, min(_BINS, max(8, round(1.5 * change.size**0.5))), (low, high))
-        marks.append(Mark("bars", edges, counts, label=case.configuration, colour=colour))
+        marks.append(ask.Mark("bars", edges, counts, label=case.configuration, colour=colour))
         nominal = _relative(*(np.array([side.value(metric)]) for side in (base, case)))
         dashed = {"linestyle": "--", "linewidth": 1.2}
         # One dashed line of the legend stands for all.
         said = "" if ends else "nominal device"
-        marks += [Mark("at", value, label=said, colour=colour, style=dashed) for value in nominal]
+        marks += [ask.Mark("at", value, label=said, colour=colour, style=dashed) for value in nominal]
         ends += [float(low), float(high), *nominal.tolist()]
     is_first = metric == found.error
     title = f"Task: {task}" if len(found.tasks) > 1 and is_first else ""
 
-    def limit_changes(axes: Axes) -> None:
+    def limit_changes(axes: Any) -> None:
         from matplotlib.ticker import MaxNLocator
 
         # Zero is shown where it is near: far from all changes it would squeeze them into a few pixels.
         low, high = min(ends, default=0.0), max(ends, default=0.0)
         span = high - low or 1.0
         if low - 0.5 * span <= 0.0 <= high + 0.5 * span:
-            axes.axvline(0.0, color=BLACK, linewidth=0.8)
+            axes.axvline(0.0, color=ask.BLACK, linewidth=0.8)
             low, high = min(low, 0.0), max(high, 0.0)
         axes.set_xlim(low - 0.08 * span, high + 0.08 * span)
         axes.xaxis.set_major_locator(MaxNLocator(_TICKS_OF_CHANGE))
         axes.locator_params(axis="y", integer=True)
 
-    axis, draws = Kind(f"{of_metric(metric).words}, change from {found.baseline}", "%"), Kind("Draws" * is_first)
-    return Panel(axis, draws, marks, title, legend="" if is_first else "figure", then=limit_changes if ends else None)
+    axis, draws = (
+        ask.Kind(f"{ask.of_metric(metric).words}, change from {found.baseline}", "%"),
+        ask.Kind("Draws" * is_first),
+    )
+    return ask.Panel(
+        axis, draws, marks, title, legend="" if is_first else "figure", then=limit_changes if ends else None
+    )
 
 
-def _relative(baseline: Floats, other: Floats) -> Floats:
-    import numpy as np
-
+def _relative(baseline: ask.Floats, other: ask.Floats) -> ask.Floats:
     # In pairs: a draw that failed on one side says nothing about a change.
     both = np.isfinite(baseline) & np.isfinite(other) & (baseline != 0.0)
     return np.asarray(100.0 * (other[both] - baseline[both]) / np.abs(baseline[both]))

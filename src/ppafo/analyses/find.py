@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from ppafo.analyses import ask, np
 from ppafo.arguments import Count, Overrides, Threads, Word, checked
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, at_fault, refused_as
 from ppafo.plugins import Plugins, name_plugins
@@ -18,16 +19,8 @@ from ppafo.units.shown import shown_in
 from ppafo.wording import one_line
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from ppafo.report.finding import Finding
-    from ppafo.report.kind import Kind
-    from ppafo.report.panels import Panel
     from ppafo.simulation.scenario import Scenario
-    from ppafo.studies.distributions import Floats
-    from ppafo.studies.limits import MetricLimit
-    from ppafo.studies.varying import VariedPath
-    from ppafo.study.runs import Rows
 
 ScenarioLike = Annotated["Scenario | str | Path", Word("SCENARIO", help="name of a scenario, or a .toml file")]
 VariedRange = Annotated[str, Word("PATH=LOW..HIGH", option="--vary")]
@@ -129,22 +122,10 @@ def find(
     (bracketed to 3e-05 psi)
     """
     name_plugins(plugins)
-    import numpy as np
-
-    from ppafo.loading import scenario_or_load
-    from ppafo.parameters.parameter_set import PATHS_THAT_SET_UNITS, units_of_texts
-    from ppafo.report.kind import of_path
-    from ppafo.simulation.declaration import changes_reach
-    from ppafo.simulation.gains import remark_on_following_gains
-    from ppafo.simulation.numbers import NOISE_SEED
-    from ppafo.studies.draws import seeds_of_noise
-    from ppafo.studies.study import with_overrides
-    from ppafo.study.runs import RunCounter, scenario_runs
-
-    base = with_overrides(scenario_or_load(scenario), overrides)
+    base = ask.with_overrides(ask.scenario_or_load(scenario), overrides)
     # As in 'supply.pressure=2..6 bar_g' and 'final_error <= 30 N cm'.
-    ranged = vary.rpartition("..")[2] if vary.strip().startswith(PATHS_THAT_SET_UNITS) else ""
-    given = units_of_texts((ranged, such_that.rpartition("=")[2]))
+    ranged = vary.rpartition("..")[2] if vary.strip().startswith(ask.PATHS_THAT_SET_UNITS) else ""
+    given = ask.units_of_texts((ranged, such_that.rpartition("=")[2]))
     with shown_in({**base.device.shown, **given}):
         with at_fault("vary"):
             path, low, high = _range(vary, base)
@@ -153,16 +134,16 @@ def find(
         if not FEWEST <= grid <= MOST:
             raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
         # The same streams for all values, so that neighbours differ by the value alone.
-        seeds = seeds_of_noise([base], [path.path], _STREAMS, _SEED)
-        streams, reach_varies = max(1, seeds.size), changes_reach([path.path])
+        seeds = ask.seeds_of_noise([base], [path.path], _STREAMS, _SEED)
+        streams, reach_varies = max(1, seeds.size), ask.changes_reach([path.path])
         wanted = "highest" if highest else "lowest"
-        counter = RunCounter(grid * streams, progress)
-        runs = scenario_runs(base, [limit.metric], counter, (), threads)
+        counter = ask.RunCounter(grid * streams, progress)
+        runs = ask.scenario_runs(base, [limit.metric], counter, (), threads)
 
-        def tried(values: Floats) -> Rows:
+        def tried(values: ask.Floats) -> ask.Rows:
             columns = {path.path: np.tile(values, streams)}
             if seeds.size:
-                columns[NOISE_SEED] = np.repeat(seeds, values.size)
+                columns[ask.NOISE_SEED] = np.repeat(seeds, values.size)
             return judged(runs.run(columns), limit, reach_varies, streams)
 
         rows, index, outer = outermost(tried, low, high, grid, highest)
@@ -180,13 +161,13 @@ def find(
             shown = [nearest]
         if outer is not None:
             try:
-                with_overrides(base, [f"{path.path}={float(values[outer])!r} {SI}"])
+                ask.with_overrides(base, [f"{path.path}={float(values[outer])!r} {SI}"])
                 shown += [outer] if shown else []
             except (ParameterError, ScenarioError) as error:
                 remarks = [f"it is the {wanted} valid value, not the limit of the condition: {error}"]
         if not seeds.size:  # with noise a single run does not represent the mean over the noise streams
             remarks += [_verdict(base, path, float(values[row]), index is None) for row in shown]
-        remarks += [remark_on_following_gains(base, [path.path]), base.origin.replaced]
+        remarks += [ask.remark_on_following_gains(base, [path.path]), base.origin.replaced]
         if runs.failures:
             remarks.append(f"{runs.failures} of {runs.count} runs failed: not met; the first: {runs.reason}")
         edges = np.flatnonzero(np.diff(np.concatenate([[False], is_met, [False]])))
@@ -212,59 +193,52 @@ def find(
             unsettled=int(rows["unsettled"].sum()),
             tried={name: column.tolist() for name, column in rows.items()},
         )
-        return _finding(found, rows, of_path(path.path, found.unit, given=path.given), base)
+        return _finding(found, rows, ask.of_path(path.path, found.unit, given=path.given), base)
 
 
-def _range(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
+def _range(text: str, base: Scenario) -> tuple[ask.VariedPath, float, float]:
     """Return path, lower and upper bound [SI] of a text ``PATH=LOW..HIGH``; StudyError for any other text."""
-    from ppafo.studies.varying import given_in, varied_path
-    from ppafo.units import split_quantity
-
     quoted, parts = f"'{one_line(text)}'", re.fullmatch(_RANGE, text)
     if parts is None:
         raise StudyError(f"{quoted} is not of the form PATH=LOW..HIGH, for example 'supply.pressure=20..90 psi_g'")
     name, lower, upper = parts.groups()
     with refused_as(StudyError, quoted, ScenarioError, UnitError):
-        path = varied_path(name, base)
+        path = ask.varied_path(name, base)
         # As in '20..90 psi_g': the low end has the unit of the high one unless it says its own.
-        if not split_quantity(lower)[1]:
-            lower = f"{lower} {split_quantity(upper)[1]}".rstrip()
+        if not ask.split_quantity(lower)[1]:
+            lower = f"{lower} {ask.split_quantity(upper)[1]}".rstrip()
         low, high = path.level(lower), path.level(upper)
     if not low < high:
         raise StudyError(f"{quoted}: the lower end must be below the upper end")
-    return given_in(path, [upper]), low, high
+    return ask.given_in(path, [upper]), low, high
 
 
-def _limit(text: str, base: Scenario, path: str) -> MetricLimit:
+def _limit(text: str, base: Scenario, path: str) -> ask.MetricLimit:
     """Return the limit of a text ``METRIC <= LIMIT``, ``METRIC >= LIMIT`` or ``follows``; StudyError for others.
 
     Gauge pressures refer to the ambient pressure of the scenario, unless ``path``, the varied number, is this pressure.
     """
-    from ppafo.metrics import METRICS
-    from ppafo.simulation.ensemble.running import lacking
-    from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, level_of
-
     quoted, parts = f"'{one_line(text)}'", re.fullmatch(_CONDITION, text)
     if text.strip() == FOLLOWS:
         # Every value that is found follows its reference; of two that do not, the error says which is nearer.
         tracked = (f"rms_{base.controlled}_error", "rms_error", "torque_error", "peak_torque")
-        errors = [name for name in tracked if name in METRICS and not lacking(base, METRICS[name])]
+        errors = [name for name in tracked if name in ask.METRICS and not ask.lacking(base, ask.METRICS[name])]
         if base.controller.is_open_loop or not errors:
             raise StudyError(f"{quoted} needs a reference, which scenario '{base.name}' lacks")
-        return MetricLimit(errors[0], math.inf, True, FOLLOWS)
+        return ask.MetricLimit(errors[0], math.inf, True, FOLLOWS)
     if parts is None:
         raise StudyError(
             f"{quoted} must be METRIC <= LIMIT or METRIC >= LIMIT, for example 'final_error <= 0.3 N m', or '{FOLLOWS}'"
         )
     metric, sign, level = parts.groups()
-    check_metrics([metric], base)
-    limit = level_of(level, metric, quoted, atmosphere_of(base, [path]))
-    return MetricLimit(metric, limit, sign == "<=", f"{metric} {sign} {level}")
+    ask.check_metrics([metric], base)
+    limit = ask.level_of(level, metric, quoted, ask.atmosphere_of(base, [path]))
+    return ask.MetricLimit(metric, limit, sign == "<=", f"{metric} {sign} {level}")
 
 
 def outermost(
-    tried: Callable[[Floats], Rows], low: float, high: float, grid: int, highest: bool
-) -> tuple[Rows, int | None, int | None]:
+    tried: Callable[[ask.Floats], ask.Rows], low: float, high: float, grid: int, highest: bool
+) -> tuple[ask.Rows, int | None, int | None]:
     """Return columns of all tried values, ascending, and rows of the outermost one that is met and its outer neighbour.
 
     ``tried`` returns columns for values, of which ``is_met`` decides. Rows are None if missing.
@@ -274,8 +248,6 @@ def outermost(
     >>> print(f"{rows['value'][index]:.5f}, {rows['value'].size} values")
     2.50000, 134 values
     """
-    import numpy as np
-
     values = np.linspace(low, high, grid)
     rows = {"value": values, **tried(values), "is_of_grid": np.full(grid, True)}
     while True:
@@ -296,7 +268,7 @@ def outermost(
         rows = {name: np.concatenate([column, more[name]])[order] for name, column in rows.items()}
 
 
-def judged(runs: Rows, limit: MetricLimit, reach_varies: bool, streams: int) -> Rows:
+def judged(runs: ask.Rows, limit: ask.MetricLimit, reach_varies: bool, streams: int) -> ask.Rows:
     """Return columns (values,) of judged runs (streams * values,).
 
     - ``metric``, ``spread``: mean and standard deviation over the noise streams [SI]; nan if a run failed
@@ -305,9 +277,8 @@ def judged(runs: Rows, limit: MetricLimit, reach_varies: bool, streams: int) -> 
     - ``follows``, ``is_kept``, ``is_met``: True if the reference is followed in all streams, the limit kept, and both
     - ``unsettled``, ``oscillating``: number of runs that swing in the second half of the hold, and throughout
     """
-    import numpy as np
 
-    def by_value(runs: NDArray[Any]) -> NDArray[Any]:
+    def by_value(runs: Any) -> Any:
         return runs.reshape(streams, -1)
 
     # Nobody would build on a loop whose command turns all the time.
@@ -331,43 +302,27 @@ def judged(runs: Rows, limit: MetricLimit, reach_varies: bool, streams: int) -> 
     }
 
 
-def _verdict(base: Scenario, path: VariedPath, value: float, has_remedy: bool) -> str:
+def _verdict(base: Scenario, path: ask.VariedPath, value: float, has_remedy: bool) -> str:
     """Return value [SI] and verdict of its run, a torque beyond the actuator's included, with the remedy if asked."""
-    from ppafo.remedy_trials import verdict_of
-    from ppafo.running import simulate
-    from ppafo.simulation.declaration import changes_reach
-    from ppafo.simulation.tracking.remarks import standing_still
-    from ppafo.simulation.tracking.remedies import change_text
-    from ppafo.simulation.tracking.rule import CRITERION_TEXTS, shortfall
-    from ppafo.studies.study import with_overrides
-
     # Given in the unit of the range, the value and what is said of it are in that unit.
-    result = simulate(with_overrides(base, [f"{path.path}={path.quote(value, '.17g')}"]))
+    result = ask.simulate(ask.with_overrides(base, [f"{path.path}={path.quote(value, '.17g')}"]))
     # The remedy that succeeds decides between possible causes.
-    verdict = verdict_of(result)
-    lacking = float(shortfall(result.scenario).max())
+    verdict = ask.verdict_of(result)
+    beyond = float(ask.shortfall(result.scenario).max())
     said = verdict.sentence
     # A value that follows within the limits may lie beyond reach, and is none to be found.
-    if not verdict.fails and lacking > 0.0 and changes_reach([path.path]):
-        said = f"{CRITERION_TEXTS['reach']} {change_text(result.scenario.controlled, lacking)}"
+    if not verdict.fails and beyond > 0.0 and ask.changes_reach([path.path]):
+        said = f"{ask.CRITERION_TEXTS['reach']} {ask.change_text(result.scenario.controlled, beyond)}"
     elif verdict.fails and not has_remedy:
         intended = f"intended: {verdict.accepted}" if verdict.accepted else ""
         said = "; ".join(filter(None, (verdict.found, verdict.cause, intended)))
-    said = "; ".join(filter(None, (said, standing_still(result, not verdict.fails))))
+    said = "; ".join(filter(None, (said, ask.standing_still(result, not verdict.fails))))
     return said and f"at {path.quote(value, '.9g')} {said}"
 
 
-def _finding(found: Threshold, rows: Rows, kind: Kind, base: Scenario) -> Finding[Threshold]:
+def _finding(found: Threshold, rows: ask.Rows, kind: ask.Kind, base: Scenario) -> Finding[Threshold]:
     """Return a search as a finding: sentences, table of intervals that meet the condition, metric over value."""
-    import numpy as np
-
-    from ppafo.parameters.overrides import over
-    from ppafo.report.finding import Finding, Section, columns_of
-    from ppafo.report.kind import of_metric
-    from ppafo.simulation.numbers import changes_in
-    from ppafo.wording import override_text
-
-    values, of_limit, is_verdict = rows["value"], of_metric(found.metric), found.condition == FOLLOWS
+    values, of_limit, is_verdict = rows["value"], ask.of_metric(found.metric), found.condition == FOLLOWS
     # Values that meet the condition although the run does not follow its reference.
     missed = 0 if is_verdict else int(np.count_nonzero(~rows["follows"] & rows["is_kept"]))
     meets = "lets the run follow its reference" if is_verdict else f"meets {found.condition}"
@@ -385,7 +340,7 @@ def _finding(found: Threshold, rows: Rows, kind: Kind, base: Scenario) -> Findin
         said += kind.text(values[row])
     else:
         # In more digits than are shown, so that the value that is pasted meets the condition.
-        used = override_text(over(base.origin.overrides, [f"{found.path}={kind.text(found.value, '.9g')}"]))
+        used = ask.override_text(ask.over(base.origin.overrides, [f"{found.path}={kind.text(found.value, '.9g')}"]))
         said = f"{found.path} = {kind.text(found.value)} is the {found.wanted} value that {meets}"
         there = "" if is_verdict else f": {name} is {of_limit.text(number)} there"
         further, beside, step = ("higher", "above", 1) if found.wanted == "highest" else ("lower", "below", -1)
@@ -414,19 +369,19 @@ def _finding(found: Threshold, rows: Rows, kind: Kind, base: Scenario) -> Findin
     inner = ", ".join(kind.number(end) for interval in found.met for end in interval if end not in exact)
     beyond = f"of the grid; the condition may be met up to {kind.change(grid[1] - grid[0])} beyond"
     drawn = "error, swing, peak or command reversals, each divided by its limit, whichever is largest," * is_verdict
-    return Finding(
+    return ask.Finding(
         name="find",
         kicker="Search",
         title=f"The {found.wanted} {found.path} such that {'the run ' * is_verdict}{found.condition}",
         said=(said, *remarks),
         parts=(
-            Section(
+            ask.Section(
                 "Where the condition is met",
-                columns_of(("from", "to"), [[kind.text(end) for end in interval] for interval in found.met]),
+                ask.columns_of(("from", "to"), [[kind.text(end) for end in interval] for interval in found.met]),
                 remarks=[f"{inner}: {beyond}"] if inner else [],
             ),
-            Section("To use the value" if used else "", code=used),
-            Section(
+            ask.Section("To use the value" if used else "", code=used),
+            ask.Section(
                 "Metric over the value",
                 panels=(_panel(found, rows, kind, of_limit, met),),
                 name="find",
@@ -436,37 +391,35 @@ def _finding(found: Threshold, rows: Rows, kind: Kind, base: Scenario) -> Findin
         ),
         found=replace(found, said=said, remarks=remarks),
         passed=found.value is not None,
-        overrides=changes_in(base),
+        overrides=ask.changes_in(base),
     )
 
 
-def _panel(found: Threshold, rows: Rows, kind: Kind, of_limit: Kind, met: str) -> Panel:
+def _panel(found: Threshold, rows: ask.Rows, kind: ask.Kind, of_limit: ask.Kind, met: str) -> ask.Panel:
     """Return a panel of the metric over the value, with the limit, the values that meet it, and the result."""
-    from ppafo.report.kind import Kind
-    from ppafo.report.panels import Mark, Panel
-    from ppafo.report.style import BLACK, BLUE, GREEN, GREY, VERMILION
-
     values, metric, number, limit = rows["value"], rows["metric"], rows["judged"], found.limit
     if found.condition == FOLLOWS:
         # The excess decides whether a run follows; it has no larger number beside it.
         metric = number = rows["excess"]
-        of_limit, limit = Kind("Largest tracking number over its limit"), 1.0
+        of_limit, limit = ask.Kind("Largest tracking number over its limit"), 1.0
     of_grid, is_met, turns = rows["is_of_grid"], rows["is_met"], rows["oscillating"] > 0
-    marks = [Mark("line", values, metric)]
-    groups: tuple[tuple[Any, Floats, str, str, dict[str, Any]], ...] = (
-        (of_grid & is_met, metric, "", BLUE, {"marker": "o"}),
-        (of_grid & ~is_met, metric, "", BLUE, {"marker": "o", "markerfacecolor": "white"}),
-        (of_grid & turns, metric, "the loop oscillates", BLACK, {"marker": "x", "markersize": 7}),
+    marks = [ask.Mark("line", values, metric)]
+    groups: tuple[tuple[Any, ask.Floats, str, str, dict[str, Any]], ...] = (
+        (of_grid & is_met, metric, "", ask.BLUE, {"marker": "o"}),
+        (of_grid & ~is_met, metric, "", ask.BLUE, {"marker": "o", "markerfacecolor": "white"}),
+        (of_grid & turns, metric, "the loop oscillates", ask.BLACK, {"marker": "x", "markersize": 7}),
         # The RMS error where that is larger, and what the condition is asked of.
-        (number > metric, number, f"{_SETTLED}, if it swings", GREY, {"marker": "+", "markersize": 6}),
+        (number > metric, number, f"{_SETTLED}, if it swings", ask.GREY, {"marker": "+", "markersize": 6}),
     )
     for which, numbers, label, colour, style in groups:
         if which.any():
             dots = {"linestyle": "", "markersize": 4, **style}
-            marks.append(Mark("line", values[which], numbers[which], label=label, colour=colour, style=dots))
-    marks.append(Mark("level", (), limit, label="limit", colour=BLACK, style={"linestyle": "--", "linewidth": 1.0}))
-    marks += [Mark("span", ends, label="" if row else met, colour=GREEN) for row, ends in enumerate(found.met)]
+            marks.append(ask.Mark("line", values[which], numbers[which], label=label, colour=colour, style=dots))
+    marks.append(
+        ask.Mark("level", (), limit, label="limit", colour=ask.BLACK, style={"linestyle": "--", "linewidth": 1.0})
+    )
+    marks += [ask.Mark("span", ends, label="" if row else met, colour=ask.GREEN) for row, ends in enumerate(found.met)]
     if found.value is not None:
         text = f"found: {kind.number(found.value, '.4g')} {kind.axis_unit}".rstrip()
-        marks.append(Mark("at", found.value, label=text, colour=VERMILION))
-    return Panel(kind, of_limit, tuple(marks))
+        marks.append(ask.Mark("at", found.value, label=text, colour=ask.VERMILION))
+    return ask.Panel(kind, of_limit, tuple(marks))

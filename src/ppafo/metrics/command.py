@@ -122,6 +122,7 @@ METRICS = (
         ReadAt(("meters.asked.squares", "meters.asked.samples"), root_mean),
         (ASKED,),
         needs=(WALK, REQUESTED),
+        better=-1,
     ),
     MetricKind(
         "requested_torque",
@@ -141,6 +142,7 @@ METRICS = (
         peak_torque,
         ReadAt(("meters.peaks.torque",)),
         (PEAKS,),
+        better=0,
     ),
     MetricKind(
         "command_reversals",
@@ -150,5 +152,6 @@ METRICS = (
         command_reversals,
         ReadAt(("meters.reversals.turns",)),
         (REVERSALS,),
+        better=0,
     ),
 )

@@ -206,15 +206,18 @@ def _of_gains(
     channels: tuple[str, ...],
     function: PlainFunction | None = None,
     meter: MeterKind = GAS,
+    better: int | None = None,
 ) -> MetricKind:
     """Declare a metric of the increase of a total, or of a function of several increases."""
     compute = partial(gained, channels=channels, function=function)
     places = tuple(f"meters.{meter.name}.gained.{channel}" for channel in channels)
-    return MetricKind(name, unit, summary, channels, compute, ReadAt(places, function), (meter,))
+    return MetricKind(name, unit, summary, channels, compute, ReadAt(places, function), (meter,), better=better)
 
 
 METRICS = (
-    _of_gains("gas_supplied", "kg", "gas taken from the supply, or by a vacuum", ("supplied_mass",), gas_taken),
+    _of_gains(
+        "gas_supplied", "kg", "gas taken from the supply, or by a vacuum", ("supplied_mass",), gas_taken, better=-1
+    ),
     _of_gains("gas_vented", "kg", "gas let out to the atmosphere, below 0 let in", ("vented_mass",)),
     _of_gains("gas_leaked", "kg", "gas leaked from chamber to chamber, in either direction", ("leaked_mass",)),
     _of_gains("gas_imbalance", "kg", "supplied less vented less stored gas", _BALANCE, gas_imbalance),
@@ -252,6 +255,7 @@ METRICS = (
         mechanical_work,
         ReadAt(("meters.work.work",)),
         (WORK,),
+        better=0,
     ),
     MetricKind(
         "work_per_gas",
@@ -270,5 +274,6 @@ METRICS = (
         gas_per_work,
         ReadAt(("meters.gas.gained.supplied_mass", "meters.work.work"), of_gas),
         (WORK, GAS),
+        better=-1,
     ),
 )

@@ -124,7 +124,8 @@ class MetricKind:
     ``ReadAt`` or a plain function, no closure, that uses arithmetic and the functions of ``model.columns``, because it
     is translated too. It is called only for runs that have the channels and the requirements in ``needs``.
     ``of_reference`` is the controlled quantity of a metric about a reference. A metric without ``compute`` cannot be
-    computed from a recording.
+    computed from a recording. ``better`` is -1 if a smaller value is better, 1 if a larger one is, 0 if neither; one
+    with None is compared on request only.
     """
 
     name: str
@@ -137,6 +138,7 @@ class MetricKind:
     traced: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
     of_reference: str = ""
+    better: int | None = None
 
 
 def for_each_reference(kinds: tuple[MetricKind, ...], rename: Callable[[str, str], str]) -> tuple[MetricKind, ...]:

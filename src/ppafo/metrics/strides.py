@@ -17,23 +17,24 @@ SETTLING = 2
 
 @dataclass(frozen=True, slots=True)
 class _StrideQuantity:
-    """Quantity per stride: unit, meaning, and path of its running total."""
+    """Quantity per stride: unit, meaning, path of its running total, and direction in which it is better."""
 
     unit: str
     summary: str
     total: str
+    better: int | None = None
 
 
 PER_STRIDE: dict[str, _StrideQuantity] = {
-    "gas": _StrideQuantity("kg", "gas taken from the supply in one stride", "state.supplied_mass"),
+    "gas": _StrideQuantity("kg", "gas taken from the supply in one stride", "state.supplied_mass", -1),
     "positive_push_off_work": _StrideQuantity(
-        "J", "positive work of T_ex while the foot rolls over the toes", "walk.positive_push_off_work"
+        "J", "positive work of T_ex while the foot rolls over the toes", "walk.positive_push_off_work", 1
     ),
     "net_push_off_work": _StrideQuantity(
-        "J", "net work of T_ex while the foot rolls over the toes", "walk.net_push_off_work"
+        "J", "net work of T_ex while the foot rolls over the toes", "walk.net_push_off_work", 1
     ),
     "toe_clearance": _StrideQuantity(
-        "m", "lowest toe height in mid-swing, relative to the healthy gait", "walk.clearances"
+        "m", "lowest toe height in mid-swing, relative to the healthy gait", "walk.clearances", 1
     ),
     "toe_landing": _StrideQuantity("-", "1 where the toes met the ground before the heel", "walk.toe_landings"),
 }
@@ -189,9 +190,16 @@ def ended_with_stride(ended: _EndedStrides, stride: _CurrentStride, sample: Samp
 METER = MeterKind("strides", StrideMeter, _start, _update)
 
 
-def _kind(name: str, unit: str, summary: str, read: Callable[[Readings], Floats], *needs: str) -> MetricKind:
+def _kind(
+    name: str,
+    unit: str,
+    summary: str,
+    read: Callable[[Readings], Floats],
+    *needs: str,
+    better: int | None = None,
+) -> MetricKind:
     """Declare a metric of a walk; ``needs`` are its additional requirements."""
-    return MetricKind(name, unit, summary, (), None, read, (METER,), needs=(WALK, *needs))
+    return MetricKind(name, unit, summary, (), None, read, (METER,), needs=(WALK, *needs), better=better)
 
 
 METRICS = (
@@ -201,6 +209,7 @@ METRICS = (
             quantity.unit,
             f"{quantity.summary}, mean",
             ReadAt((f"meters.strides.ended.sums.{name}", "meters.strides.ended.averaged"), mean_of),
+            better=quantity.better,
         )
         for name, quantity in PER_STRIDE.items()
     ),
@@ -216,6 +225,7 @@ METRICS = (
         "RMS of requested torque less actuator torque in push-off",
         ReadAt(("meters.strides.ended.squared_errors", "meters.strides.ended.push_off_samples"), root_mean),
         REQUESTED,
+        better=-1,
     ),
     _kind("strides", "-", "whole strides of the walk", ReadAt(("meters.strides.ended.whole",))),
     _kind(

@@ -208,6 +208,7 @@ METRICS = (
         switchings,
         ReadAt(("meters.switchings.changes",)),
         (SWITCHINGS,),
+        better=-1,
     ),
     *for_each_reference(_OSCILLATIONS, lambda name, controlled: f"{controlled}_{name}"),
 )

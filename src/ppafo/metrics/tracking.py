@@ -121,7 +121,16 @@ def read_rms_error_hold(readings: Readings) -> Floats:
 
 
 _OF_TORQUE = (
-    MetricKind("rms_error", "N m", f"{_RMS} over the whole run", _NEEDED, rms_error, read_rms_error, (SQUARED_ERROR,)),
+    MetricKind(
+        "rms_error",
+        "N m",
+        f"{_RMS} over the whole run",
+        _NEEDED,
+        rms_error,
+        read_rms_error,
+        (SQUARED_ERROR,),
+        better=-1,
+    ),
     *(
         MetricKind(
             f"rms_error_{part_of.__name__}",
@@ -131,6 +140,7 @@ _OF_TORQUE = (
             partial(rms_error, part_of=part_of),
             read,
             (SQUARED_ERROR,),
+            better=-1,
         )
         for part_of, read in ((ramp, read_rms_error_ramp), (hold, read_rms_error_hold))
     ),
@@ -142,6 +152,7 @@ _OF_TORQUE = (
         peak_error,
         ReadAt(("meters.absolute_error.largest",)),
         (ABSOLUTE_ERROR,),
+        better=-1,
     ),
     MetricKind(
         "final_error",

@@ -35,7 +35,7 @@ def of_curve(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Finding[Threshold
         def model(columns: Mapping[str, Floats]) -> dict[str, Floats]:
             return {metric: curve(columns["supply.pressure"] / BAR)}
 
-        monkeypatch.setattr("ppafo.study.runs.scenario_runs", lambda *_: model_runs(model, [metric]))
+        monkeypatch.setattr("ppafo.analyses.asking.scenario_runs", lambda *_: model_runs(model, [metric]))
         return find(TASK, vary=RANGE, such_that=condition, **options)
 
     return search
@@ -167,7 +167,7 @@ def test_the_value_rests_on_many_noise_streams_and_not_on_the_seed_of_the_scenar
         seen.append(seeds)
         return {"final_error": 6.3 - pressure + noise(seeds)}
 
-    monkeypatch.setattr("ppafo.study.runs.scenario_runs", lambda *_: model_runs(model, ["final_error"]))
+    monkeypatch.setattr("ppafo.analyses.asking.scenario_runs", lambda *_: model_runs(model, ["final_error"]))
     found = [
         find(
             TASK, vary=RANGE, such_that=LIMIT, overrides=["sensors.pressure_noise=1 kPa_d", f"sensors.seed={seed}"]

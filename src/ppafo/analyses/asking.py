@@ -1,0 +1,49 @@
+"""Vocabulary of the questions: what they take from the packages below, by one import."""
+
+from ppafo.arguments.values import taken_tasks
+from ppafo.loading import scenario_or_load
+from ppafo.metrics import METRICS, Metric
+from ppafo.metrics.tracking import TRACKING
+from ppafo.parameters.overrides import over
+from ppafo.parameters.parameter_set import PATHS_THAT_SET_UNITS, units_of_texts
+from ppafo.remedy_trials import verdict_of
+from ppafo.report.finding import Column, Finding, Section, columns_of
+from ppafo.report.kind import ConfidenceInterval, Kind, of_metric, of_path
+from ppafo.report.panels import Mark, Panel, dots
+from ppafo.report.style import BLACK, BLUE, COLOURS, GREEN, GREY, VERMILION, look_of_valve
+from ppafo.running import simulate
+from ppafo.simulation.declaration import changes_reach
+from ppafo.simulation.ensemble.running import lacking
+from ppafo.simulation.gains import gains_of, remark_on_following_gains
+from ppafo.simulation.numbers import NOISE_SEED, changes_in
+from ppafo.simulation.simulate import Result, Status, simulate_many
+from ppafo.simulation.tracking import Tracking
+from ppafo.simulation.tracking.remarks import standing_still
+from ppafo.simulation.tracking.remedies import change_text
+from ppafo.simulation.tracking.rule import CRITERION_TEXTS, shortfall
+from ppafo.studies.distributions import Floats
+from ppafo.studies.draws import (
+    FEWEST_DRAWS,
+    MAXIMUM_DRAWS,
+    REPLICATES,
+    Uncertainty,
+    seeds_of_noise,
+    study_of,
+    uncertainty_of,
+)
+from ppafo.studies.intervals import (
+    effective_sample_size,
+    fraction_text,
+    is_carried,
+    noise_interval,
+    replicates_interval,
+    share_interval,
+)
+from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, level_of
+from ppafo.studies.sampling import with_new_noise
+from ppafo.studies.study import DEFAULT_SEED, changes_of, choose_configurations, configurations_with, with_overrides
+from ppafo.studies.varying import VariedPath, distribution_in, given_in, value_at, varied_path
+from ppafo.study.blocks import unvaried
+from ppafo.study.runs import FAILED, Rows, RunCounter, scenario_runs
+from ppafo.units import split_quantity
+from ppafo.wording import override_text
