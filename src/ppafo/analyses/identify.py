@@ -191,7 +191,7 @@ def identify(
     >>> from ppafo.cli.new import new
     >>> written = new("example", "measured-cylinder")
     >>> print(str(ppafo.identify("measured-cylinder/cylinder.toml")).splitlines()[0])
-    static-torque: 80 readings, 80 repetitions; area 520.1 mm^2, friction in motion 4.14 N; scatter 0.233 N
+    static-torque: 80 readings, 80 repetitions; scatter 0.233 N
     """
     name_plugins(plugins)
     from ppafo.identification.problem import load_problem

@@ -8,7 +8,7 @@ from ppafo.analyses.study_results import load_study_results
 from ppafo.errors import DataError
 from ppafo.report.recording_figure import recording_figure
 from ppafo.report.stored_figure import draw_stored_walk, read_result, stated_units
-from ppafo.rig.folder import RIG_FILE
+from ppafo.rig.experiments import RIG_FILE
 from ppafo.storage.owned_folder import MARK, entries_of, marking_command, read_json
 from ppafo.storage.reading import read_recording
 from ppafo.storage.result_folder import MANIFEST, NETCDF_FILE, RUN_FILE

@@ -316,8 +316,7 @@ def rig_simulate(
     written: rig (valve-map.csv, rig.json)
     """
     from ppafo.cli.output import CommandOutput, blame_out_option
-    from ppafo.rig.experiments import NOTICE, record
-    from ppafo.rig.folder import check_rig_folder, write_rig_recording
+    from ppafo.rig.experiments import NOTICE, check_rig_folder, record, write_rig_recording
 
     # A folder that cannot be used is refused before anything runs.
     with blame_out_option():
@@ -337,6 +336,15 @@ def rig_simulate(
 def list_rig() -> CommandOutput:
     """List experiments and presets of the simulated bench with descriptions."""
     from ppafo.cli.output import CommandOutput
-    from ppafo.rig.experiments import overview
+    from ppafo.rig.experiments import EXPERIMENTS
+    from ppafo.rig.preset import list_presets, load_preset
 
-    return CommandOutput(*overview())
+    listed = {
+        "experiments": {name: each.summary for name, each in EXPERIMENTS.items()},
+        "presets": {name: load_preset(name).title for name in list_presets()},
+    }
+    lines = ["all recordings are synthetic"]
+    for title, items in listed.items():
+        lines += [f"{title}:", *(f"  {name:<16}  {summary}" for name, summary in items.items())]
+    rows = {title: [{"name": name, "summary": said} for name, said in items.items()] for title, items in listed.items()}
+    return CommandOutput("\n".join(lines), rows)

@@ -17,7 +17,7 @@ from ppafo.identification.bench.law import BenchContext, BenchLaw, BenchResult
 from ppafo.identification.bench.readings import check_channels
 from ppafo.identification.bench.static_torque import FORCE, TORQUE, StaticTorqueProblem
 from ppafo.identification.bench.valve_map import ValveMapProblem
-from ppafo.identification.bench.vane_leak import VaneLeakProblem
+from ppafo.identification.bench.vane_leak import SteadyLeakProblem, VaneLeakProblem
 from ppafo.identification.estimate import WRONG_UNIT
 from ppafo.identification.source import RecordingSource
 from ppafo.parameters.parameter_set import atmospheric_pressure
@@ -115,11 +115,16 @@ def _in_unit(recording: Recording, names: Iterable[str], factor: float, atmosphe
     return recording
 
 
-BenchProblem = StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | ValveMapProblem | VaneLeakProblem
+BenchProblem = (
+    StaticTorqueProblem
+    | FreeDecayProblem
+    | OpenValveFlowProblem
+    | ValveMapProblem
+    | VaneLeakProblem
+    | SteadyLeakProblem
+)
 """Bench laws in the recommended order: each after those whose results it uses."""
-LAWS: dict[str, type[BenchLaw]] = {
-    kind: law for law in get_args(BenchProblem) for kind in get_args(law.__annotations__["kind"])
-}
+LAWS: dict[str, type[BenchLaw]] = {get_args(law.__annotations__["kind"])[0]: law for law in get_args(BenchProblem)}
 """Bench laws by kind, in the recommended order."""
 
 

@@ -1,7 +1,8 @@
 """Experiments of the simulated bench: synthetic recordings of runs and of steady states, with the errors of sensors.
 
 Motion and gas are those of ``simulate``, in a tenth of its steps; a preset adds effects that the identified model has
-not. Readings of steady states are formulas. ``record`` returns the recording with the true parameters.
+not. Readings of steady states are formulas. ``record`` returns the recording with the true parameters; a folder of
+recordings has a CSV file for each experiment, and ``rig.json``.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -12,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from ppafo.constants import PASCALS_PER_PSI
-from ppafo.documents.json_text import fields_of, plain
-from ppafo.errors import ParameterError, SimulationError
+from ppafo.documents.json_text import fields_of, json_text, plain
+from ppafo.errors import DataError, ParameterError, SimulationError
 from ppafo.model.catalog import VALVES
 from ppafo.model.gas import temperature_flow_factor
 from ppafo.model.orifice import FlowCurve, orifice_flow
@@ -23,14 +24,19 @@ from ppafo.parameters.device import VANE, Device, SonicOrifice
 from ppafo.parameters.loading import load_device, load_parameter_set
 from ppafo.parameters.overrides import read_overrides
 from ppafo.parameters.plant import plant_parameters, valve_settings
-from ppafo.rig.preset import PREFIX, Preset, list_presets, load_preset
+from ppafo.rig.preset import PREFIX, Preset, load_preset
 from ppafo.signals.recording import CHANNELS, Channel, Floats, Recording
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.scenario import LARGEST_SEED, UNITS, Scenario, vane_motion
 from ppafo.simulation.simulate import simulate
+from ppafo.storage.comma_separated import marked_csv_bytes
+from ppafo.storage.files import LEFT_ASIDE, add_files, check_files_can_be_added
+from ppafo.storage.owned_folder import entries_of, read_json
 from ppafo.version import __version__
 from ppafo.wording import argument_text, known_names, one_line
 
+RIG_FILE, _RIG_FORMAT = "rig.json", "ppafo rig"
+"""File with all true values beside the recordings of a folder, and its format."""
 NOTICE = "synthetic: made by the simulated test bench of ppafo in place of a measurement"
 """Notice in the metadata of every recording of the simulated bench."""
 
@@ -68,39 +74,6 @@ def random_stream(seed: int, channel: str, *more: int) -> np.random.Generator:
     # By its position, not its name: renaming a channel leaves its noise.
     sequence = np.random.SeedSequence([seed, list(SENSORS).index(channel), *more])
     return np.random.Generator(np.random.PCG64(sequence))
-
-
-def read_off(
-    preset: Preset,
-    channel: str,
-    seed: int,
-    true: Floats,
-    *,
-    interval: float = 0.0,
-    turn: float = 0.0,
-    meter_range: float = 1.0,
-) -> tuple[Floats, dict[str, float]]:
-    """Return readings of true values [SI] by the sensor of a channel, and its offset [SI] and gain error [-].
-
-    Arguments:
-        interval: sample interval [s]; 0 for readings of steady states, which no lag changes
-        turn: value [SI] that a gain error leaves as it is, the atmosphere for a gauge sensor
-        meter_range: range relative to that of the preset's sensor [-], which scales offset, noise and resolution
-    """
-    names = ("gain", "lag", "offset", "noise", "resolution")
-    gain, lag, offset, noise, resolution = (preset.values[f"{SENSORS[channel]}.{name}"] for name in names)
-    stream = random_stream(seed, channel)
-    # The offset comes first, so that a longer recording begins with the same noise.
-    offset *= meter_range * float(stream.standard_normal())
-    gain *= float(random_stream(seed, channel, 1).standard_normal())
-    shown = np.array(true)
-    for sample in range(1, shown.size if lag > 0.0 and interval > 0.0 else 0):
-        shown[sample] = follow(
-            1.0 / lag, interval, float(shown[sample - 1]), float(true[sample - 1]), float(true[sample])
-        )
-    shown += gain * (shown - turn) + offset + meter_range * noise * stream.standard_normal(true.size)
-    readings = [quantise(float(value), meter_range * resolution) for value in shown]
-    return np.array(readings), {"offset": offset, "gain": gain}
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,31 +193,32 @@ def _valve_flow(device: Device, preset: Preset, upstream: float, downstream: flo
     return flow * temperature_flow_factor(device.gas.temperature, warmer)
 
 
-_STEADY: dict[str, Callable[[Device, Preset, int], dict[str, Floats]]] = {
-    "static-torque": _static_torque,
-    "open-valve-flow": _open_valve,
-    "vane-leak-steady": _steady_leak,
-    "valve-map": _valve_map,
-}
-"""Experiments whose readings are taken at rest, and the functions that return their true values [SI] by channel."""
-_MOVING: dict[str, tuple[str, ...]] = {
-    "free-decay": ("angle",),
-    "vane-leak": ("pressure_1", "pressure_2"),
-    "step-response": (*_SENSED, "command", "torque"),
-    "torque-task": (*_SENSED, "command", "reference", "torque"),
-}
-"""Channels of experiments that are runs."""
+@dataclass(frozen=True, slots=True)
+class RigExperiment:
+    """Experiment: a run of which ``channels`` are recorded, or readings ``at_rest``: true values [SI] by channel."""
+
+    summary: str
+    channels: tuple[str, ...] = ()
+    at_rest: Callable[[Device, Preset, int], dict[str, Floats]] | None = None
+
+
 EXPERIMENTS = {
-    "static-torque": "torque on a scale over pressure, three times up and down",
-    "free-decay": "angle after an impulse, chambers open to the room",
-    "open-valve-flow": "flow of the open valve at many pressures",
-    "vane-leak": "pressures of plugged chambers as gas leaks across the vane",
-    "vane-leak-steady": "flow that maintains the pressure in chamber 1",
-    "valve-map": "flow of the valve over its command, up and down",
-    "step-response": "figure 7: valve opened fully, vane from stop to stop",
-    "torque-task": "figure 8: torque ramp and hold under control",
+    "static-torque": RigExperiment("torque on a scale over pressure, three times up and down", at_rest=_static_torque),
+    "free-decay": RigExperiment("angle after an impulse, chambers open to the room", ("angle",)),
+    "open-valve-flow": RigExperiment("flow of the open valve at many pressures", at_rest=_open_valve),
+    "vane-leak": RigExperiment(
+        "pressures of plugged chambers as gas leaks across the vane", ("pressure_1", "pressure_2")
+    ),
+    "vane-leak-steady": RigExperiment("flow that maintains the pressure in chamber 1", at_rest=_steady_leak),
+    "valve-map": RigExperiment("flow of the valve over its command, up and down", at_rest=_valve_map),
+    "step-response": RigExperiment(
+        "figure 7: valve opened fully, vane from stop to stop", (*_SENSED, "command", "torque")
+    ),
+    "torque-task": RigExperiment(
+        "figure 8: torque ramp and hold under control", (*_SENSED, "command", "reference", "torque")
+    ),
 }
-"""Summaries of the experiments by name."""
+"""Experiments by name."""
 
 
 def record(
@@ -279,14 +253,15 @@ def record(
     scenario = _scenario(experiment, device, valve, bench, [text for text in overrides if text not in of_preset])
     true = scenario.device
     true.check_pressurised("the simulated test bench", "; use the recording of a simulated run")
-    if experiment in _MOVING:
+    at_rest = EXPERIMENTS[experiment].at_rest
+    if at_rest is None:
         values, interval = _run(experiment, scenario), scenario.run.output_interval
     else:
-        values, interval = _STEADY[experiment](true, bench, seed), _READING_INTERVAL
+        values, interval = at_rest(true, bench, seed), _READING_INTERVAL
     recording, errors = _read(experiment, values, interval, bench, true, seed)
     moved = vane_motion(scenario)
     kind = "leg" if moved.leg else getattr(moved, "kind", "free")
-    motion = {"prescribed": "measured"}.get(kind, kind) if experiment in _MOVING else ""
+    motion = {"prescribed": "measured"}.get(kind, kind) if at_rest is None else ""
     truth = {
         "notice": NOTICE,
         "units": UNITS,
@@ -302,16 +277,6 @@ def record(
         **({"replaced": scenario.origin.replaced} if scenario.origin.replaced else {}),
     }
     return RigRecording(recording, truth, motion)
-
-
-def overview() -> tuple[str, dict[str, Any]]:
-    """Return the list of experiments and presets with descriptions, as text and as plain data."""
-    listed = {"experiments": EXPERIMENTS, "presets": {name: load_preset(name).title for name in list_presets()}}
-    lines = ["all recordings are synthetic"]
-    for title, items in listed.items():
-        lines += [f"{title}:", *(f"  {name:<16}  {summary}" for name, summary in items.items())]
-    rows = {title: [{"name": name, "summary": said} for name, said in items.items()] for title, items in listed.items()}
-    return "\n".join(lines), rows
 
 
 def _scenario(experiment: str, device: str, valve: str | None, bench: Preset, overrides: list[str]) -> Scenario:
@@ -369,31 +334,90 @@ def _run(experiment: str, scenario: Scenario) -> dict[str, Floats]:
     lines = {"supply_pressure": "line_pressure_1", "dorsiflexion_pressure": "line_pressure_2"}
     values |= {name: found[line] for name, line in lines.items() if line in found}
     values |= {name: found[name] for name in found.names}
-    return {name: values[name] for name in _MOVING[experiment]}
+    return {name: values[name] for name in EXPERIMENTS[experiment].channels}
 
 
 def _read(
     experiment: str, true: Mapping[str, Floats], interval: float, bench: Preset, device: Device, seed: int
 ) -> tuple[Recording, dict[str, dict[str, float]]]:
     """Return the recording of the sensors, and offset [SI] and gain error [-] of each; other channels are exact."""
-    ambient, is_run = device.supply.atmospheric_pressure, experiment in _MOVING
+    ambient, is_run = device.supply.atmospheric_pressure, EXPERIMENTS[experiment].at_rest is None
     channels, errors = dict[str, Floats](), dict[str, dict[str, float]]()
     for name, values in true.items():
         channels[name] = values
-        if name in SENSORS and not (is_run and name == "torque"):
-            channels[name], errors[name] = read_off(
-                bench,
-                name,
-                seed,
-                values,
-                interval=interval if is_run else 0.0,
-                # A gauge sensor shows the atmosphere as 0, whatever its gain.
-                turn=ambient if CHANNELS[name].unit == "Pa" and name != "pressure_difference" else 0.0,
-                meter_range=_SMALL_METER if (experiment, name) == ("vane-leak-steady", "mass_flow") else 1.0,
-            )
+        if name not in SENSORS or (is_run and name == "torque"):
+            continue
+        of_sensor = ("gain", "lag", "offset", "noise", "resolution")
+        gain, lag, offset, noise, resolution = (bench.values[f"{SENSORS[name]}.{number}"] for number in of_sensor)
+        # The meter of a leak has a smaller range, which scales offset, noise and resolution.
+        scale = _SMALL_METER if (experiment, name) == ("vane-leak-steady", "mass_flow") else 1.0
+        stream = random_stream(seed, name)
+        # The offset comes first, so that a longer recording begins with the same noise.
+        offset *= scale * float(stream.standard_normal())
+        gain *= float(random_stream(seed, name, 1).standard_normal())
+        shown = np.array(values)
+        # Readings of steady states no lag changes.
+        for sample in range(1, shown.size if lag > 0.0 and is_run else 0):
+            before, now = float(values[sample - 1]), float(values[sample])
+            shown[sample] = follow(1.0 / lag, interval, float(shown[sample - 1]), before, now)
+        # A gauge sensor shows the atmosphere as 0, whatever its gain.
+        turn = ambient if CHANNELS[name].unit == "Pa" and name != "pressure_difference" else 0.0
+        shown += gain * (shown - turn) + offset + scale * noise * stream.standard_normal(shown.size)
+        channels[name] = np.array([quantise(float(value), scale * resolution) for value in shown])
+        errors[name] = {"offset": offset, "gain": gain}
     if is_run and "torque" in true:
         # Of the measured pressures, as a laboratory has it.
         channels["torque"] = device.actuator.torque_constant * (channels["pressure_1"] - channels["pressure_2"])
     times = np.arange(len(next(iter(true.values()))), dtype=np.float64) * interval
     described = {name: Channel(values, CHANNELS[name].unit) for name, values in channels.items()}
     return Recording(experiment, times, described, kind="synthetic"), errors
+
+
+def check_rig_folder(folder: Path, experiment: str) -> None:
+    """Raise DataError if a folder is not writable or contains files of another origin; called before a run."""
+    _earlier(folder, f"{experiment}.csv")
+    check_files_can_be_added(folder, [f"{experiment}.csv", RIG_FILE])
+
+
+def write_rig_recording(folder: Path, recorded: RigRecording) -> tuple[str, ...]:
+    """Write recording and true parameters into a folder, and return the file names.
+
+    Raises DataError if the folder contains files of another origin.
+    """
+    name = f"{recorded.truth['experiment']}.csv"
+    recordings = {**_earlier(folder, name), name: dict(recorded.truth)}
+    document = {
+        "format": _RIG_FORMAT,
+        "schema_version": 1,
+        "notice": NOTICE,
+        "recordings": {key: recordings[key] for key in sorted(recordings)},
+    }
+    # By rig.json a folder is known to be the rig's: it is there first, whenever the process is killed.
+    add_files(folder, {RIG_FILE: f"{json_text(document)}\n".encode(), name: marked_csv_bytes(recorded.recording)})
+    return name, RIG_FILE
+
+
+def _earlier(folder: Path, name: str) -> dict[str, Any]:
+    """Return the entries of ``rig.json`` for the recordings already in a folder.
+
+    Raises DataError if the folder was not written by the rig, or if the recording ``name`` would replace a file of
+    another origin.
+    """
+    # A file that a killed writer left behind is the writer's own.
+    entries = entries_of(folder) if folder.is_dir() else []
+    present = {entry.name for entry in entries if LEFT_ASIDE not in entry.name}
+    recordings: Any = {}
+    if RIG_FILE in present:
+        document = read_json(folder / RIG_FILE)
+        is_of_rig = isinstance(document, dict) and document.get("format") == _RIG_FORMAT
+        recordings = document.get("recordings") if is_of_rig else None
+    if not isinstance(recordings, dict) or (present and RIG_FILE not in present):
+        raise DataError(
+            f"{folder}: is not empty and contains no {RIG_FILE} of the simulated test bench; choose another folder"
+        )
+    if name in present and name not in recordings:
+        raise DataError(
+            f"{folder}: contains '{name}', which was not written by the simulated test bench; move this file or choose "
+            "another folder"
+        )
+    return dict(recordings)

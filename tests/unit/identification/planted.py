@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.identification.bench.flow import GasAt, Opening, OpeningSizes, orifice_shape
+from ppafo.identification.bench.flow import GasAt, Opening, orifice_shape
 from ppafo.identification.bench.law import BenchContext, BenchResult
 from ppafo.identification.bench.valve_map import area_of_command, spool_of
 from ppafo.identification.bench.vane_leak import pressures_of_fall
@@ -101,7 +101,7 @@ def leak(
     time = np.arange(0.0, 20.0, 0.05)
     opening = Opening(CO2, "laminar" if law == "laminar" else "orifice")
     rate = CO2.specific_gas_constant * CO2.temperature / volume
-    first, second = pressures_of_fall(opening, OpeningSizes(size), SUPPLY, ROOM, ratio, rate, time)
+    first, second = pressures_of_fall(opening, {"size": size}, SUPPLY, ROOM, ratio, rate, time)
     draw = np.random.default_rng(seed)
     first, second = (values + draw.normal(0.0, 300.0, time.size) - lost * time for values in (first, second))
     return source("leak", time, pressure_1=(first, "Pa"), pressure_2=(second, "Pa"))
@@ -110,7 +110,7 @@ def leak(
 def steady(law: str, size: float, zero: float = 0.0, seed: int = 1) -> RecordingSource:
     """Twenty-four readings of the flow that keeps up a pressure; Cd A or c is planted, and the zero of the meter."""
     first, second = np.linspace(1.3e5, 6.0e5, 24), np.full(24, ROOM)
-    flow = Opening(CO2, "laminar" if law == "laminar" else "orifice").flow(OpeningSizes(size), first, second)
+    flow = Opening(CO2, "laminar" if law == "laminar" else "orifice").flow({"size": size}, first, second)
     flow = flow * (1.0 + np.random.default_rng(seed).normal(0.0, 0.003, 24)) + zero
     channels = {"pressure_1": (first, "Pa"), "pressure_2": (second, "Pa"), "mass_flow": (flow, "kg/s")}
     return source("steady", np.arange(24.0), **channels)
@@ -199,5 +199,6 @@ def vane_leak(
         "actuator.leak.discharge_coefficient": (discharge_coefficient, ""),
         "actuator.leak.critical_ratio": (critical_ratio, ""),
     }
+    kind, volumes = ("vane-leak-steady", ()) if "mass_flow" in sources[0].recording else ("vane-leak", volumes)
     stated = {f"volume_{number}": f"{volume!r} m^3" for number, volume in enumerate(volumes, 1)}
-    return in_gas("vane-leak", sources, gas, tolerances, numbers, law=law, **stated)
+    return in_gas(kind, sources, gas, tolerances, numbers, law=law, **stated)

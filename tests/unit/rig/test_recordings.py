@@ -10,8 +10,7 @@ import pytest
 
 from ppafo.errors import DataError, ParameterError, PpafoError
 from ppafo.rig import RigRecording, list_presets, load_preset, record
-from ppafo.rig.experiments import EXPERIMENTS, on_scale
-from ppafo.rig.folder import write_rig_recording
+from ppafo.rig.experiments import EXPERIMENTS, on_scale, write_rig_recording
 from ppafo.rig.preset import PATHS, json_schema
 from ppafo.running import simulate
 from ppafo.signals.recording import CHANNELS

@@ -16,8 +16,7 @@ the sensors are tolerances.
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from scipy.optimize import nnls
@@ -39,6 +38,7 @@ from ppafo.identification.bench.law import (
     within,
 )
 from ppafo.identification.bench.readings import (
+    check_enough,
     check_moves,
     check_no_wrong_reading,
     check_not_clipped,
@@ -46,7 +46,7 @@ from ppafo.identification.bench.readings import (
     meter_readings,
 )
 from ppafo.identification.fit import Fit
-from ppafo.identification.least_squares import FitNumber
+from ppafo.identification.least_squares import FitNumber, Flags
 from ppafo.identification.source import RecordingSource, pool
 from ppafo.identification.tolerances import GAS_LAW as LIMIT_OF_GAS_LAW
 from ppafo.identification.tolerances import Tolerances
@@ -62,8 +62,8 @@ from ppafo.units import from_si
 from ppafo.units.spelling import molar_mass_in
 from ppafo.wording import known_names
 
-CHANNELS = ("upstream_pressure", "downstream_pressure", "mass_flow")
-MINIMUM_SAMPLES = 5
+_VALVE_PRESSURES = ("upstream_pressure", "downstream_pressure")
+_MINIMUM_SAMPLES = 5
 """Least number of readings at the open valve to separate the unknowns."""
 _FULLY_OPEN = 0.99
 """Magnitude of the command [-] from which a valve is fully open."""
@@ -78,7 +78,6 @@ LARGEST_COEFFICIENT = 1.0
 _GRAMS_PER_BAR = 1.0e8
 """Conversion factor from kg/(s Pa) to g/s per bar."""
 _SIZE = FitNumber("size")
-_GAP = reported("open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of a gap beside it")
 Law = Literal["orifice", "iso6358", "laminar", "both"]
 
 VALVE = "name of a valve of the set; default: the chosen one"
@@ -93,8 +92,6 @@ LINEAR_RATIO = 0.99999
 
 The parameter ``flow.linear_ratio`` of a set belongs to the numerics of the engine, not to a measured opening.
 """
-PRODUCT_ONLY = 1.0
-"""Known factor of an orifice if neither Cd [-] nor the area [m^2] is known: the fitted size is the product Cd A."""
 CRITICAL_RATIOS = 0.2, 0.01, 0.95
 """Critical ratio of ISO 6358 [-] in an estimation: start, lowest and highest value."""
 _SPAN, _SUBSONIC = 0.15, 0.6
@@ -109,7 +106,7 @@ LAW_NAMES: Mapping[Law, str] = {
 
 TEMPERATURE, GAS_LAW, METER, SENSORS = "gas temperature", "gas law", "gain of the flow meter", "gain of the pressures"
 ZERO = "zero of the flow meter"
-APPARENT = "laminar gap equivalent to a gain error of the flow meter"
+_APPARENT = "laminar gap equivalent to a gain error of the flow meter"
 """Names of the tolerances of a flow bench."""
 
 
@@ -201,31 +198,32 @@ def gas_tolerances(gas: GasAt, tolerances: Tolerances) -> tuple[FitNumber, ...]:
 
 
 def flow_tolerances(
-    gas: GasAt, tolerances: Tolerances, names: tuple[str, str], largest: float
+    gas: GasAt, tolerances: Tolerances, pressures: Mapping[str, Floats], flow: Floats
 ) -> tuple[FitNumber, ...]:
-    """Return the uncertain quantities of a flow bench: gas, gains and zeros; ``names`` are the pressure channels.
-
-    ``largest`` is the largest reading of the flow meter [kg/s].
-    """
+    """Return the uncertain quantities of a flow bench: gas, gains and zeros of the sensors of pressures and flow."""
     return (
         *gas_tolerances(gas, tolerances),
         *within(METER, tolerances.gain_of("mass_flow")),
         *within(SENSORS, tolerances.gain_of("pressure")),
-        *within(ZERO, tolerances.zero_of_flow * largest),
-        *(item for name in names for item in within(f"zero of {name}", tolerances.zero_of_pressure)),
+        *within(ZERO, tolerances.zero_of_flow * float(np.abs(flow).max())),
+        *(item for name in pressures for item in within(f"zero of {name}", tolerances.zero_of_pressure)),
     )
 
 
-def read_flow(at: Values, gas: GasAt, flow: Floats) -> Floats:
-    """Return the flow meter reading [kg/s] for a flow at the nominal gas state [kg/s], with the errors ``at``."""
+def shown_flow(
+    at: Values, gas: GasAt, pressures: Mapping[str, Floats], flow: Callable[[Floats, Floats], Floats]
+) -> Floats:
+    """Return the flow meter reading [kg/s] at two shown pressures [Pa], by channel, with the errors ``at``.
+
+    ``flow`` is the flow at the nominal gas state [kg/s] by true pressures [Pa]; a gain error acts on gauge pressures.
+    """
+    first, second = (
+        np.asarray(shown - at[f"zero of {name}"] - at[SENSORS] * (shown - STANDARD_ATMOSPHERE))
+        for name, shown in pressures.items()
+    )
     # Flow through an opening goes with one over the root of the temperature.
     warm = np.sqrt(gas.temperature / (gas.temperature + at[TEMPERATURE]))
-    return np.asarray((1.0 + at[GAS_LAW]) * (1.0 + at[METER]) * warm * flow + at[ZERO])
-
-
-def true_pressure(at: Values, name: str, shown: Floats) -> Floats:
-    """Return the true pressure [Pa] for a sensor reading [Pa]; a gain error acts on the gauge pressure."""
-    return np.asarray(shown - at[f"zero of {name}"] - at[SENSORS] * (shown - STANDARD_ATMOSPHERE))
+    return np.asarray((1.0 + at[GAS_LAW]) * (1.0 + at[METER]) * warm * flow(first, second) + at[ZERO])
 
 
 def orifice_shape(first: Floats, second: Floats, heat_capacity_ratio: float) -> Floats:
@@ -259,47 +257,22 @@ def _shape(first: Floats, second: Floats, curve: Callable[[Floats], Floats]) -> 
     return np.asarray(np.sign(first - second) * flow * np.minimum((1.0 - ratio) / (1.0 - LINEAR_RATIO), 1.0))
 
 
-def has_both_regimes(ratio: Floats) -> bool:
-    """Return True if the pressure ratios [-] cover choked and subsonic flow, which C and b of ISO 6358 need."""
-    return bool(np.ptp(ratio) >= _SPAN and ratio.max() >= _SUBSONIC)
-
-
-def check_both_regimes(ratio: Floats, source: RecordingSource) -> None:
-    """Raise IdentificationError if the pressure ratios [-] do not determine both C and b of ISO 6358."""
-    if not has_both_regimes(ratio):
-        source.refuse(
-            f"C and b need readings with choked and with subsonic flow: pressure ratios over {_SPAN:g} or more, up to "
-            f"{_SUBSONIC:g}, not from {ratio.min():.3g} to {ratio.max():.3g}"
-        )
-
-
-class OpeningSizes(NamedTuple):
-    """Sizes of an opening, the unknowns of a flow fit.
-
-    ``size`` is Cd [-], A [m^2] or Cd A [m^2] of an orifice, C [m^3/(s Pa)] of ISO 6358, or c [kg/(s Pa^2)] of a laminar
-    gap. ``critical_ratio`` is b [-]; ``beside`` is c of a parallel laminar gap [kg/(s Pa^2)].
-    """
-
-    size: float
-    critical_ratio: float = 0.0
-    beside: float = 0.0
-
-
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """Flow law of an opening: gas, law, known quantities, and the sizes as they are reported.
+    """Flow law of an opening: gas, law, and its sizes as they are reported, the unknowns of a flow fit.
 
-    For an orifice, ``known`` is the area [m^2] or discharge coefficient [-] that multiplies the unknown size; ISO 6358
-    does not use it. A ``critical_ratio`` [-] of None is estimated. The law ``both`` is a laminar ``gap`` in parallel
+    ``size`` is Cd [-], A [m^2] or Cd A [m^2] of an orifice, C [m^3/(s Pa)] of ISO 6358, or c [kg/(s Pa^2)] of a laminar
+    gap. Of an orifice, ``known`` is the area [m^2] or discharge coefficient [-] that multiplies it. A
+    ``critical_ratio`` [-] of None is estimated. The law ``both`` is a laminar ``gap``, c [kg/(s Pa^2)], in parallel
     with ISO 6358 if the critical ratio is given, or else with an orifice.
     """
 
     gas: GasAt
     law: Law
-    known: float = PRODUCT_ONLY
-    critical_ratio: float | None = None
     size: FitNumber = _SIZE
-    gap: FitNumber = _GAP
+    known: float = 1.0
+    critical_ratio: float | None = None
+    gap: FitNumber = _SIZE
 
     @property
     def has_sought_ratio(self) -> bool:
@@ -311,76 +284,101 @@ class Opening:
         """Path of the critical ratio, in the section of the size."""
         return f"{self.size.path.rpartition('.')[0]}.critical_ratio"
 
-    def sizes(self, at: Values) -> OpeningSizes:
-        """Return the sizes, given the values of the fit."""
-        return OpeningSizes(at[self.size.path], at[self.ratio_path], at[self.gap.path])
+    def parts(self, first: Floats, second: Floats, ratio: float) -> list[tuple[str, float, Floats]]:
+        """Return path, factor and shape of each part, whose product with its size is its flow [kg/s].
 
-    def unknowns(self, start: OpeningSizes, alone: OpeningSizes) -> tuple[FitNumber, ...]:
-        """Return the unknowns with start values.
+        ``first`` and ``second`` are the pressures [Pa] from and to which a positive flow runs, ``ratio`` is a sought
+        critical ratio [-].
+        """
+        laminar = np.asarray(first**2 - second**2)
+        if self.law == "laminar":
+            return [(self.size.path, 1.0, laminar)]
+        gap = [(self.gap.path, 1.0, laminar)] if self.law == "both" else []
+        if self.law == "iso6358" or (gap and self.critical_ratio is not None):
+            known = ratio if self.critical_ratio is None else self.critical_ratio
+            shape = iso6358_shape(first, second, known)
+            return [(self.size.path, self.gas.flow_per_sonic_conductance, shape), *gap]
+        shape = orifice_shape(first, second, self.gas.heat_capacity_ratio)
+        return [(self.size.path, self.known * self.gas.choked_flow_constant, shape), *gap]
+
+    def flow(self, sizes: Values, first: Floats, second: Floats) -> Floats:
+        """Return the mass flow [kg/s] for pressures [Pa] and sizes by path, positive from first to second."""
+        parts = self.parts(first, second, sizes.get(self.ratio_path, 0.0))
+        return np.asarray(sum(sizes[path] * factor * shape for path, factor, shape in parts))
+
+    def unknowns(self, starts: Sequence[float], alone: Sequence[float], ratio: float) -> tuple[FitNumber, ...]:
+        """Return the unknowns with start values of the parts and of the critical ratio.
 
         Parallel parts have the magnitude of the sizes ``alone``, as if each carried the whole flow: either may be zero,
         which is a valid result.
         """
-        if self.law != "both":
-            ratio = reported(self.ratio_path, "", "Critical ratio b of ISO 6358")
-            of_ratio = (sought(ratio, start.critical_ratio, *CRITICAL_RATIOS[1:]),) if self.has_sought_ratio else ()
-            return (sought(self.size, start.size, 0.0), *of_ratio)
-        parts = (self.size, start.size, alone.size), (self.gap, start.beside, alone.beside)
-        return tuple(sought(replace(part, size=whole), first, 0.0, scale=whole) for part, first, whole in parts)
-
-    def flow(self, sizes: OpeningSizes, first: Floats, second: Floats) -> Floats:
-        """Return the mass flow [kg/s] for pressures [Pa], positive from first to second."""
-        laminar = np.asarray(first**2 - second**2)
-        if self.law == "laminar":
-            return np.asarray(sizes.size * laminar)
-        if self.law == "iso6358" or (self.law == "both" and self.critical_ratio is not None):
-            ratio = sizes.critical_ratio if self.critical_ratio is None else self.critical_ratio
-            through = sizes.size * self.gas.flow_per_sonic_conductance * iso6358_shape(first, second, ratio)
-        else:
-            per_size = self.known * self.gas.choked_flow_constant
-            through = sizes.size * per_size * orifice_shape(first, second, self.gas.heat_capacity_ratio)
-        return through + sizes.beside * laminar if self.law == "both" else through
-
-    def rough_sizes(
-        self, first: Floats, second: Floats, flow: Floats, ratios: Sequence[float] = CRITICAL_RATIOS[:1]
-    ) -> tuple[OpeningSizes, OpeningSizes]:
-        """Return start sizes by non-negative least squares, and the sizes if each part alone carried the whole flow.
-
-        The flow is linear in the sizes; the nonlinear critical ratio is the best of ``ratios``, by default its usual
-        value.
-        """
-        units = {ratio: self.flow(OpeningSizes(1.0, ratio), first, second) for ratio in ratios}
-        ratio = max(units, key=lambda each: abs(float(units[each] @ flow)) / float(np.linalg.norm(units[each])))
-        parts = [units[ratio]]
-        parts += [self.flow(OpeningSizes(0.0, ratio, 1.0), first, second)] if self.law == "both" else []
-        columns = np.stack(parts, axis=1)
-        alone = np.linalg.norm(flow) / np.linalg.norm(columns, axis=0)
-        size, *beside = (nnls(columns * alone, flow)[0] * alone).tolist()
-        return OpeningSizes(size, ratio, *beside), OpeningSizes(float(alone[0]), ratio, *alone[1:].tolist())
+        if self.law == "both":
+            parts = zip((self.size, self.gap), starts, alone, strict=True)
+            return tuple(sought(replace(part, size=whole), start, 0.0, scale=whole) for part, start, whole in parts)
+        critical = reported(self.ratio_path, "", "Critical ratio b of ISO 6358")
+        of_ratio = (sought(critical, ratio, *CRITICAL_RATIOS[1:]),) if self.has_sought_ratio else ()
+        return (sought(self.size, starts[0], 0.0), *of_ratio)
 
 
-def size_of(
-    noun: str, section: str, law: Law, critical_ratio: float | None, of_set: FitNumber | None = None
-) -> FitNumber:
-    """Return the size of an opening as it is reported, ``of_set`` for an orifice of which the set knows a factor.
+def opening_of(
+    noun: str,
+    section: str,
+    gas: GasAt,
+    law: Law,
+    critical_ratio: float | None,
+    of_set: tuple[FitNumber, float] | None = None,
+) -> Opening:
+    """Return an opening; ``of_set`` is the size of an orifice of which the set knows a factor, and this factor.
 
     ``section`` is that of the opening in a set; a size that a set has not is of the ``noun``.
     """
     own = {"open valve": "open_valve_flow", "leak": "vane_leak"}[noun]
+    gap = f"{own}.laminar_coefficient" if noun == "open valve" else "effects.laminar_leak.coefficient"
+    size, known = of_set or (reported(f"{own}.effective_area", "m^2", f"Effective area Cd A of the {noun}"), 1.0)
     if law == "laminar":
-        return reported(f"{own}.laminar_coefficient", "kg/(s Pa^2)", f"Laminar coefficient of the {noun}")
-    if law == "iso6358" or critical_ratio is not None:
-        known = "" if critical_ratio is None else f" with the set's b = {critical_ratio:g}"
-        return reported(f"{section}.sonic_conductance", "m^3/(s Pa)", f"Sonic conductance C of the {noun}{known}")
-    return of_set or reported(f"{own}.effective_area", "m^2", f"Effective area Cd A of the {noun}")
+        size = reported(f"{own}.laminar_coefficient", "kg/(s Pa^2)", f"Laminar coefficient of the {noun}")
+    elif law == "iso6358" or critical_ratio is not None:
+        of_ratio = "" if critical_ratio is None else f" with the set's b = {critical_ratio:g}"
+        size = reported(f"{section}.sonic_conductance", "m^3/(s Pa)", f"Sonic conductance C of the {noun}{of_ratio}")
+    beside = "it" if noun == "open valve" else "the orifice"
+    gap_number = reported(gap, "kg/(s Pa^2)", f"Laminar coefficient of a gap beside {beside}")
+    return Opening(gas, law, size, known, critical_ratio, gap_number)
 
 
-def shown_flow(opening: Opening, pressures: Mapping[str, Floats], at: Values) -> Floats:
+def has_both_regimes(opening: Opening, ratio: Floats, source: RecordingSource) -> bool:
+    """Return True if the pressure ratios [-] cover choked and subsonic flow, which C and b of ISO 6358 need.
+
+    Raises IdentificationError if they do not, but the opening seeks both.
+    """
+    covers = bool(np.ptp(ratio) >= _SPAN and ratio.max() >= _SUBSONIC)
+    if opening.has_sought_ratio and not covers:
+        source.refuse(
+            f"C and b need readings with choked and with subsonic flow: pressure ratios over {_SPAN:g} or more, up to "
+            f"{_SUBSONIC:g}, not from {ratio.min():.3g} to {ratio.max():.3g}"
+        )
+    return covers
+
+
+def steady_readings(
+    sources: tuple[RecordingSource, ...], names: tuple[str, str], zero: float, used: Flags
+) -> tuple[dict[str, Floats], Floats, list[str], tuple[str, ...]]:
+    """Return pressures [Pa] by name, flow [kg/s] and recording of the possible readings, and remarks on the others.
+
+    ``zero`` is the limit of the zero of the meter, as a fraction of its largest reading [-]; ``used`` marks the
+    readings that count.
+    """
+    first, second = (pool(sources, name) for name in names)
+    check_no_wrong_reading(sources, "mass_flow", (first, second), used)
+    flow, used, remarks = meter_readings(sources, first - second, zero, used)
+    labels = np.array(recordings_of(sources))[used].tolist()
+    return dict(zip(names, (first[used], second[used]), strict=True)), flow[used], labels, remarks
+
+
+def flow_through(at: Values, opening: Opening, pressures: Mapping[str, Floats]) -> Floats:
     """Return the flow meter reading [kg/s] through an opening at two shown pressures [Pa], by channel."""
-    first, second = (true_pressure(at, name, shown) for name, shown in pressures.items())
-    sizes = opening.sizes(at)
-    sizes = sizes._replace(beside=sizes.beside + at[APPARENT])
-    return read_flow(at, opening.gas, opening.flow(sizes, first, second))
+    gap = opening.gap.path
+    sizes = {**at, gap: at[gap] + at[_APPARENT]}
+    return shown_flow(at, opening.gas, pressures, lambda first, second: opening.flow(sizes, first, second))
 
 
 def solve_flow(
@@ -394,25 +392,29 @@ def solve_flow(
     """Fit an opening to measured flow. Returns the fit and the fitted flow [kg/s].
 
     ``pressures`` are two channels [Pa absolute]; a positive flow [kg/s] runs from the first to the second. A sought
-    critical ratio starts from the best of ``ratios`` [-].
+    critical ratio starts from the best of ``ratios`` [-], the sizes, in which the flow is linear, from non-negative
+    least squares.
     """
-    (first_name, shown_first), (second_name, shown_second) = pressures.items()
-    flow = readings.measured
-    start, alone = opening.rough_sizes(shown_first, shown_second, flow, ratios)
+    flow, (first, second) = readings.measured, pressures.values()
+    units = {ratio: [factor * shape for _, factor, shape in opening.parts(first, second, ratio)] for ratio in ratios}
+    ratio = max(units, key=lambda each: abs(float(units[each][0] @ flow)) / float(np.linalg.norm(units[each][0])))
+    columns = np.stack(units[ratio], axis=1)
+    alone = np.linalg.norm(flow) / np.linalg.norm(columns, axis=0)
+    starts = (nnls(columns * alone, flow)[0] * alone).tolist()
     numbers = (
-        *opening.unknowns(start, alone),
-        *flow_tolerances(opening.gas, tolerances, (first_name, second_name), float(np.abs(flow).max())),
+        *opening.unknowns(starts, alone.tolist(), ratio),
+        *flow_tolerances(opening.gas, tolerances, pressures, flow),
         # A gain that differs between small and large flows bends the curve of one opening as a gap beside it does.
-        *(within(APPARENT, tolerances.gain_of("mass_flow") * alone.beside) if opening.law == "both" else ()),
+        *(within(_APPARENT, tolerances.gain_of("mass_flow") * float(alone[1])) if opening.law == "both" else ()),
     )
-    return solve(partial(shown_flow, opening, pressures), readings, numbers, confidence)
+    return solve(lambda at: flow_through(at, opening, pressures), readings, numbers, confidence)
 
 
 @dataclass(frozen=True, kw_only=True)
 class OpenValveFlowProblem(FlowLaw):
     """Table of procedure open-valve-flow: Cd, or C and b of ISO 6358, of the fully open valve."""
 
-    needed = CHANNELS
+    needed = (*_VALVE_PRESSURES, "mass_flow")
     steady = ("open-valve-flow",)
     kind: Literal["open-valve-flow"]
     valve: str | None = keyed(VALVE, None)
@@ -425,28 +427,25 @@ class OpenValveFlowProblem(FlowLaw):
         6358 where the set has its b. With the area of the set, an orifice is its Cd. Raises IdentificationError for
         recordings that do not determine the law.
         """
-        gas, path = self.gas_of(sources, context), context.valve_path(self.valve)
+        gas, path, zero = self.gas_of(sources, context), context.valve_path(self.valve), context.tolerances.zero_of_flow
         area, critical_ratio = (context.number(f"{path}.{name}") for name in ("area", "critical_ratio"))
-        check_sources(sources, CHANNELS, MINIMUM_SAMPLES, absolute=CHANNELS[:2])
+        check_sources(sources, self.needed, _MINIMUM_SAMPLES, absolute=_VALVE_PRESSURES)
         for source in sources:
-            upstream, downstream = (source.recording[name] for name in CHANNELS[:2])
             # A saturated meter shows a constant flow although the pressures change the flow.
+            upstream, downstream = (source.recording[name] for name in _VALVE_PRESSURES)
             driving = orifice_shape(upstream, downstream, gas.heat_capacity_ratio)
             check_not_clipped(source, "mass_flow", "orifice flow at these pressures", driving)
         recordings = [source.recording for source in sources]
         # In a recording without commands, the valve is taken to be open.
         commands = [item["command"] if "command" in item else np.ones(len(item)) for item in recordings]
         is_open = np.abs(np.concatenate(commands)) >= _FULLY_OPEN
-        if is_open.sum() < MINIMUM_SAMPLES:
-            sources[0].refuse(
-                f"needs at least {MINIMUM_SAMPLES} readings with the valve fully open "
-                f"(command 1 or -1), not {int(is_open.sum())}"
-            )
-        upstream, downstream, flow = (pool(sources, name) for name in CHANNELS)
-        is_crossed, zero, remarks = downstream >= upstream, context.tolerances.zero_of_flow, tuple[str, ...]()
+        fully_open = "readings with the valve fully open (command 1 or -1)"
+        check_enough(sources[0], int(is_open.sum()), _MINIMUM_SAMPLES, fully_open)
+        upstream, downstream, flow = (pool(sources, name) for name in self.needed)
+        is_crossed, remarks = downstream >= upstream, tuple[str, ...]()
         # A log may begin before the gas supply is on: no flow without pressure difference is then no error of a column.
         is_at_rest = is_open & is_crossed & (np.abs(flow) <= zero * float(np.abs(flow[is_open]).max()))
-        if is_at_rest.sum() > is_open.sum() // _FEW and (is_open & ~is_at_rest).sum() >= MINIMUM_SAMPLES:
+        if is_at_rest.sum() > is_open.sum() // _FEW and (is_open & ~is_at_rest).sum() >= _MINIMUM_SAMPLES:
             remarks = (
                 f"left out: {is_at_rest.sum()} of {is_open.sum()} readings without flow and pressure difference",
             )
@@ -460,44 +459,38 @@ class OpenValveFlowProblem(FlowLaw):
             )
         if np.ptp(flow[is_open]) <= 0.0:
             check_moves(sources[0], "mass_flow")
-        check_no_wrong_reading(sources, "mass_flow", (upstream, downstream), is_open)
-        _, used, meter_remarks = meter_readings(sources, upstream - downstream, zero, is_open)
-        upstream, downstream, flow = upstream[used], downstream[used], np.abs(flow[used])
+        pressures, flow, labels, meter_remarks = steady_readings(sources, _VALVE_PRESSURES, zero, is_open)
+        (upstream, downstream), flow = pressures.values(), np.abs(flow)
         ratio = downstream / upstream
-        if self.law == "iso6358":
-            check_both_regimes(ratio, sources[0])
         # In parallel with a laminar gap, b selects ISO 6358; the law ``iso6358`` estimates b.
         known_ratio = critical_ratio if self.law == "both" else None
         text = f"Discharge coefficient with the set's area of {1e6 * (area or 0.0):.4g} mm^2; only Cd A is identified"
-        coefficient = reported(f"{path}.discharge_coefficient", "", text) if area else None
-        size = size_of("open valve", path, self.law, known_ratio, coefficient)
-        opening = Opening(gas, self.law, area or PRODUCT_ONLY, known_ratio, size, _GAP)
+        of_set = (reported(f"{path}.discharge_coefficient", "", text), area) if area else None
+        opening = opening_of("open valve", path, gas, self.law, known_ratio, of_set)
+        has_both_regimes(opening, ratio, sources[0])
         # The nearer the pressures are to each other, the more their noise affects the computed flow.
         limits = critical_pressure_ratio(gas.heat_capacity_ratio), _NEARLY_EQUAL
         regimes = [_REGIMES[regime] for regime in np.digitize(ratio, limits).tolist()]
-        fitted, model = solve_flow(
-            opening,
-            {"upstream_pressure": upstream, "downstream_pressure": downstream},
-            PooledReadings(flow, regimes, np.array(recordings_of(sources))[used].tolist()),
-            context.tolerances,
-            self.confidence,
-        )
+        readings = PooledReadings(flow, regimes, labels)
+        fitted, model = solve_flow(opening, pressures, readings, context.tolerances, self.confidence)
         scatter = float(np.std(flow - model) / flow.max())
-        measured_ordinate, fitted_ordinate = (_GRAMS_PER_BAR * values / upstream for values in (flow, model))
         # Densely, so that the curve has no kinks at the readings; between them the upstream pressure is interpolated.
         dense, order = np.linspace(ratio.min(), ratio.max(), 200), np.argsort(ratio)
         first = np.interp(dense, ratio[order], upstream[order])
-        shown = {"upstream_pressure": first, "downstream_pressure": dense * first}
-        law_flow = shown_flow(opening, shown, defaultdict(float, fitted.by_name))
-        curve = curve_mark(LAW_NAMES[self.law], dense, _GRAMS_PER_BAR * law_flow / first)
-        marks = readings_mark("measured", ratio, measured_ordinate), curve
+        shown = dict(zip(pressures, (first, dense * first), strict=True))
+        law_flow = flow_through(defaultdict(float, fitted.by_name), opening, shown)
+        measured, modelled = (_GRAMS_PER_BAR * values / upstream for values in (flow, model))
+        marks = (
+            readings_mark("measured", ratio, measured),
+            curve_mark(LAW_NAMES[self.law], dense, _GRAMS_PER_BAR * law_flow / first),
+        )
         axes = Kind("Pressure ratio"), Kind("Flow over upstream pressure", "g/s per bar")
         result = result_of(
             sources,
             fitted,
             f"{flow.size} readings at pressure ratios from {ratio.min():.2f} to {ratio.max():.2f}; "
             f"scatter {scatter:.2%} of the largest flow",
-            with_residuals("Open-valve flow", *axes, marks, ratio, measured_ordinate - fitted_ordinate),
+            with_residuals("Open-valve flow", *axes, marks, ratio, measured - modelled),
             remarks=(*remarks, *meter_remarks),
             scatter=scatter,
         )

@@ -12,6 +12,7 @@ Without an inertia only beta/I [1/s] and T_c/I [rad/s^2] can be estimated.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
@@ -30,7 +31,13 @@ from ppafo.identification.bench.law import (
     tolerance,
     within,
 )
-from ppafo.identification.bench.readings import check_moves, check_no_gap, check_sources, without_wrong_samples
+from ppafo.identification.bench.readings import (
+    check_enough,
+    check_moves,
+    check_no_gap,
+    check_sources,
+    without_wrong_samples,
+)
 from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.source import RecordingSource, window
 from ppafo.model.declaration import Number
@@ -43,25 +50,20 @@ from ppafo.signals.faults import is_at_limit, noise_of, plateaus
 from ppafo.signals.recording import Floats
 from ppafo.wording import count_of
 
-ANGLE = "angle"
-VELOCITY = "angular_velocity"
-"""Channel fitted together with the angle, if recorded."""
-MINIMUM_SAMPLES = 20
+_ANGLE, _VELOCITY = "angle", "angular_velocity"
+"""Fitted channels; the velocity is fitted together with the angle, if recorded."""
+_MINIMUM_SAMPLES = 20
 """Least number of samples of a decay."""
-FEWEST_SMOOTHED = 5
-"""Least number of samples to which a local parabola is fitted."""
-_SMOOTHED_FRACTION = 0.04
-"""Fraction of the samples of a decay to which a local parabola is fitted [-]."""
+_FEWEST_SMOOTHED, _SMOOTHED_FRACTION = 5, 0.04
+"""Least number and fraction of the samples of a decay to which a local parabola is fitted."""
 _REVERSAL = 0.02
 """Backward velocity relative to the largest velocity [-] that counts as a reversal; noise at rest stays below."""
 _VELOCITY_MAY_DIFFER = 0.1
 """Largest relative difference of velocity and rate of the angle [-]; a wrong unit or sign differs by more."""
 _MINIMUM_OVER_NOISE = 20.0
 """Least range of the angle divided by its noise [-] for motion to be detected."""
-_NEAR = 0.05
-"""Distance from the end of a swing, relative to the swing [-], within which the vane is near this end."""
-_NOISE_NEAR = 6.0
-"""Least such distance divided by the noise of the angle [-]."""
+_NEAR, _NOISE_NEAR = 0.05, 6.0
+"""Distance from the end of a swing within which the vane is near it: fraction of the swing [-], at least this noise."""
 _AT_ONCE = 2.0
 """Duration near the end of a swing, relative to the last half of the swing [-], below which the vane did not rest."""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
@@ -80,20 +82,10 @@ _STEPS_OF_DECAY = 5.0e-6, 0.2
 """Times between samples of a free decay [s], which lasts seconds at most; others mean a wrong unit of time."""
 _MOST_OF_STOPS = 10.0
 """Largest plausible ratio of swing in a free decay to angle between the stops [-]; more means a wrong unit."""
-_UNIT_INERTIA = 1.0
-"""Inertia [kg m^2] in place of an unknown one: the fitted parameters are then parameters divided by the inertia."""
 _LEAST_SPEED, _LEAST_SWEPT = 1.0e-6, 1.0e-9
 """Least initial speed [rad/s] and swept angle [rad] for a fit without visible motion."""
 _MOVING = 0.03
 """Fraction of the largest speed [-] below which the damping panel omits the noisy acceleration."""
-_OF_THE_DEVICE = (
-    reported("friction.viscous_damping", "N m s/rad", "Viscous damping"),
-    reported("friction.dynamic_torque", "N m", "Dynamic friction"),
-)
-_OVER_INERTIA = (
-    reported("free_decay.damping_over_inertia", "1/s", "Viscous damping over the inertia"),
-    reported("free_decay.friction_over_inertia", "rad/s^2", "Dynamic friction over the inertia"),
-)
 
 
 class FreeDecay(NamedTuple):
@@ -108,68 +100,56 @@ class FreeDecay(NamedTuple):
 def decay_of(source: RecordingSource, start: float | None, end: float | None) -> FreeDecay:
     """Return the decay between two times [s] of a recording; by default it starts at the largest speed.
 
-    Raises IdentificationError, with file, sample and remedy, if there are too few samples, if nothing moves, or if the
-    sensor is saturated or contradicts the velocity.
+    Raises IdentificationError, with file, sample and remedy, if there are too few samples, if nothing moves, if the
+    largest swing ends in a return swing without rest, as on a spring, or if the sensor is saturated or contradicts the
+    velocity.
     """
-    check_moves(source, ANGLE)
+    check_moves(source, _ANGLE)
     part = window(source.recording, start, end)
-    if len(part) < MINIMUM_SAMPLES:
-        source.refuse(f"needs at least {MINIMUM_SAMPLES} samples from start to end, not {len(part)}")
-    swept, noise = float(np.ptp(part[ANGLE])), noise_of(part[ANGLE])
+    check_enough(source, len(part), _MINIMUM_SAMPLES, "samples from start to end")
+    swept, noise = float(np.ptp(part[_ANGLE])), noise_of(part[_ANGLE])
     if swept < _MINIMUM_OVER_NOISE * noise:
         source.refuse(f"no motion: the angle changes by {swept:.3g} rad at a noise of {noise:.3g} rad")
     skipped = check_no_gap(source, part)
     # A start that the user gave is after the push.
     has_start = start is not None
-    speeds, _ = smoothed_rates(part.time, part[ANGLE])
+    speeds, _ = smoothed_rates(part.time, part[_ANGLE])
     fastest = 0 if has_start else int(np.argmax(np.abs(speeds)))
-    _check_comes_to_rest(source, part.time[fastest:], part[ANGLE][fastest:], noise)
+    time, angle = part.time[fastest:], part[_ANGLE][fastest:]
+    # Friction alone stops the vane.
+    turn = max(int(np.argmin(angle)), int(np.argmax(angle)))
+    distance = np.abs(angle - angle[turn])
+    near = max(_NEAR * float(distance.max()), _NOISE_NEAR * noise)
+    away = turn + np.flatnonzero(distance[turn:] > near)
+    if away.size:
+        halfway, reached = (time[np.flatnonzero(distance[:turn] > far)[-1]] for far in (0.5 * distance.max(), near))
+        if time[away[0]] - reached < _AT_ONCE * (reached - halfway):
+            source.refuse(
+                f"the vane turns back at {time[turn]:.3g} s without coming to rest, so another torque acts, such as a "
+                "spring, gravity, a stop or a hand"
+            )
     sign = 1.0 if speeds[fastest] > 0.0 else -1.0
     # A push ends a little after the highest speed of the smoothed signal; that much is left out.
     first = fastest if has_start else fastest + smoothing_width(part.time.size) // 2
     back = np.flatnonzero(sign * speeds[first:] < -_REVERSAL * np.abs(speeds).max())
     last = first + int(back[0]) if back.size else part.time.size
-    if last - first < MINIMUM_SAMPLES:
-        source.refuse(
-            f"{last - first} samples lie between the highest speed and the first reversal "
-            f"(or the end), but {MINIMUM_SAMPLES} are needed"
-        )
-    rows = slice(first, last)
-    angle = part[ANGLE][rows]
+    check_enough(source, last - first, _MINIMUM_SAMPLES, "samples from the highest speed to the first reversal or end")
+    time, angle = part.time[first:last], part[_ANGLE][first:last]
     for plateau in plateaus(angle):
         if is_at_limit(angle, plateau):
             source.refuse(
                 f"channel 'angle' stays at {plateau.value:g} rad in {plateau.count} rows, "
                 f"from sample {skipped + first + plateau.first + 1}: saturated, or at a stop"
             )
-    time, velocity = part.time[rows], None
-    if VELOCITY in part:
-        velocity = part[VELOCITY][rows]
+    velocity = part[_VELOCITY][first:last] if _VELOCITY in part else None
+    if velocity is not None:
         # The angle is compared with the area under the velocity.
         moved = np.concatenate(([0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time))))
         deviation = angle - angle.mean()
         gain = float(deviation @ moved / (deviation @ deviation))
         if abs(gain - 1.0) > _VELOCITY_MAY_DIFFER:
-            source.refuse(f"channel '{VELOCITY}' is {gain:.3g} times the derivative of 'angle'")
-    return FreeDecay(time=time - time[0], angle=angle, sign=sign, velocity=velocity)
-
-
-def _check_comes_to_rest(source: RecordingSource, time: Floats, angle: Floats, noise: float) -> None:
-    """Raise IdentificationError if the largest swing ends in a return swing without rest, as on a spring.
-
-    Friction alone stops the vane. ``noise`` is the standard deviation of the angle [rad].
-    """
-    end = max(int(np.argmin(angle)), int(np.argmax(angle)))
-    distance = np.abs(angle - angle[end])
-    near = max(_NEAR * float(distance.max()), _NOISE_NEAR * noise)
-    back = end + np.flatnonzero(distance[end:] > near)
-    if back.size:
-        halfway, reached = (time[np.flatnonzero(distance[:end] > far)[-1]] for far in (0.5 * distance.max(), near))
-        if time[back[0]] - reached < _AT_ONCE * (reached - halfway):
-            source.refuse(
-                f"the vane turns back at {time[end]:.3g} s without coming to rest, so "
-                "another torque acts, such as a spring, gravity, a stop or a hand"
-            )
+            source.refuse(f"channel '{_VELOCITY}' is {gain:.3g} times the derivative of 'angle'")
+    return FreeDecay(time - time[0], angle, sign, velocity)
 
 
 def smoothed_rates(time: Floats, angle: Floats) -> tuple[Floats, Floats]:
@@ -187,7 +167,7 @@ def smoothed_rates(time: Floats, angle: Floats) -> tuple[Floats, Floats]:
 
 def smoothing_width(count: int) -> int:
     """Return the length of the smoothing window, an odd number of samples, for a decay of ``count`` samples."""
-    return max(FEWEST_SMOOTHED, int(_SMOOTHED_FRACTION * count)) | 1
+    return max(_FEWEST_SMOOTHED, int(_SMOOTHED_FRACTION * count)) | 1
 
 
 class Slowing(NamedTuple):
@@ -209,16 +189,11 @@ class Slowing(NamedTuple):
         return self.damping_rate * speed + self.deceleration * (1.0 + grip)
 
 
-class _DecayCurve(NamedTuple):
-    """Time [s], swept angle [rad] and speed [rad/s] of a decay to standstill."""
+def fall_to_standstill(speed: float, slowing: Slowing) -> tuple[Floats, Floats, Floats]:
+    """Return time [s], swept angle [rad] and speed [rad/s] of a decay from a speed to standstill.
 
-    time: Floats
-    swept: Floats
-    speed: Floats
-
-
-def course_to_standstill(speed: float, slowing: Slowing) -> _DecayCurve:
-    """Return the decay from a speed [rad/s] to standstill, by Gauss quadrature of dt = -dw / deceleration over w."""
+    They are the Gauss quadrature of dt = -dw / deceleration over w.
+    """
     # Cubed, for the slowing near standstill, where a seal grips, needs the shortest steps.
     speeds = speed * np.linspace(1.0, 0.0, _STEPS + 1) ** 3
     middle, half = 0.5 * (speeds[1:] + speeds[:-1]), 0.5 * (speeds[:-1] - speeds[1:])
@@ -226,27 +201,26 @@ def course_to_standstill(speed: float, slowing: Slowing) -> _DecayCurve:
     decelerations = slowing.at(nodes)
     # Without any friction the time would be infinite.
     decelerations = np.maximum(decelerations, _SLOWEST * float(decelerations.max()) + 1e-300)
-    times = half * ((1.0 / decelerations) @ _WEIGHTS)
-    swept = half * ((nodes / decelerations) @ _WEIGHTS)
-    return _DecayCurve(np.concatenate(([0.0], np.cumsum(times))), np.concatenate(([0.0], np.cumsum(swept))), speeds)
+    times, swept = half * ((1.0 / decelerations) @ _WEIGHTS), half * ((nodes / decelerations) @ _WEIGHTS)
+    return np.concatenate(([0.0], np.cumsum(times))), np.concatenate(([0.0], np.cumsum(swept))), speeds
 
 
-def course(times: Floats, speed: float, slowing: Slowing) -> _DecayCurve:
-    """Return swept angle and speed at times [s] after a start at ``speed`` [rad/s]; zero speed after standstill."""
+def course(times: Floats, speed: float, slowing: Slowing) -> tuple[Floats, Floats]:
+    """Return swept angle [rad] and speed [rad/s] at times [s] after a start at a speed; 0 from standstill on."""
     from scipy.interpolate import CubicHermiteSpline
 
-    known = course_to_standstill(speed, slowing)
-    rising = np.concatenate(([True], np.diff(known.time) > 0.0))
-    inside = np.minimum(times, known.time[-1])
-    angle = CubicHermiteSpline(known.time[rising], known.swept[rising], known.speed[rising])
-    return _DecayCurve(times, np.asarray(angle(inside)), np.asarray(angle.derivative()(inside)))
+    known, swept, speeds = fall_to_standstill(speed, slowing)
+    rising = np.concatenate(([True], np.diff(known) > 0.0))
+    inside = np.minimum(times, known[-1])
+    angle = CubicHermiteSpline(known[rising], swept[rising], speeds[rising])
+    return np.asarray(angle(inside)), np.asarray(angle.derivative()(inside))
 
 
 @dataclass(frozen=True, kw_only=True)
 class FreeDecayProblem(TimedLaw):
     """Table of procedure free-decay: viscous damping and Coulomb friction from the decay after an impulse."""
 
-    needed = (ANGLE,)
+    needed = (_ANGLE,)
     kind: Literal["free-decay"]
     inertia: float | None = keyed(
         Number(
@@ -274,16 +248,14 @@ class FreeDecayProblem(TimedLaw):
         impulses to the same device, with common parameters and separate initial states. Raises IdentificationError for
         recordings that determine neither parameter, or times or angles in a wrong unit.
         """
+        check_sources(sources, self.needed, _MINIMUM_SAMPLES)
         low, high = (context.number(f"actuator.angle_{end}") for end in ("min", "max"))
         for source in sources:
             step = float(np.median(np.diff(source.recording.time))) if len(source.recording) > 1 else 0.0
             if step and not _STEPS_OF_DECAY[0] < step < _STEPS_OF_DECAY[1]:
-                source.refuse(
-                    f"the times of the samples are {step:.3g} s apart; is the unit of time "
-                    f"{'ms' if step > 1.0e-3 else 's'}?"
-                )
-            angles = source.recording[ANGLE] if ANGLE in source.recording else source.recording.time[:1]
-            turned = float(angles.max() - angles.min())
+                unit = "ms" if step > 1.0e-3 else "s"
+                source.refuse(f"the times of the samples are {step:.3g} s apart; is the unit of time {unit}?")
+            turned = float(np.ptp(source.recording[_ANGLE]))
             if low is not None and high is not None and turned > _MOST_OF_STOPS * (high - low) > 0.0:
                 source.refuse(
                     f"'angle' covers {turned:.4g} rad ({turned / math.tau:.3g} turns), but "
@@ -293,33 +265,41 @@ class FreeDecayProblem(TimedLaw):
         # Near standstill, the friction of a seal is at most the static friction.
         rise = max(static / dynamic - 1.0, 0.0) if static and dynamic else 1.0
         inertia, inertia_deviation = self.inertia_of(context)
-        check_sources(sources, (ANGLE,), MINIMUM_SAMPLES)
-        sources, remarks = without_wrong_samples(sources, (ANGLE, VELOCITY), self.start, self.end)
-        decays = tuple(decay_of(source, self.start, self.end) for source in sources)
-        numbers = _OF_THE_DEVICE if inertia else _OVER_INERTIA
-        assumed_inertia = inertia or _UNIT_INERTIA
+        sources, remarks = without_wrong_samples(sources, (_ANGLE, _VELOCITY), self.start, self.end)
+        decays = [decay_of(source, self.start, self.end) for source in sources]
+        of_damping, of_friction = (
+            reported("friction.viscous_damping", "N m s/rad", "Viscous damping"),
+            reported("friction.dynamic_torque", "N m", "Dynamic friction"),
+        )
+        if not inertia:
+            of_damping, of_friction = (
+                reported("free_decay.damping_over_inertia", "1/s", "Viscous damping over the inertia"),
+                reported("free_decay.friction_over_inertia", "rad/s^2", "Dynamic friction over the inertia"),
+            )
+        # Without an inertia the fitted parameters are parameters divided by the inertia.
+        assumed_inertia = inertia or 1.0
         variables = (
-            *_unknowns(decays, numbers, assumed_inertia, rise),
+            *_unknowns(decays, of_damping, of_friction, assumed_inertia, rise),
             *tolerance(_INERTIA, inertia_deviation / assumed_inertia),
-            *within(_GAIN, context.tolerances.gain_of(ANGLE)),
+            *within(_GAIN, context.tolerances.gain_of(_ANGLE)),
         )
         # A wrong law gives different parameters for fast and for slow motion.
         parts = []
         for decay in decays:
             moved = np.abs(decay.angle - decay.angle[0])
             half = int(np.searchsorted(np.maximum.accumulate(moved), 0.5 * float(moved.max())))
-            speeds = [] if decay.velocity is None else [(VELOCITY, decay.velocity)]
-            parts.append((half, [(ANGLE, decay.angle), *speeds]))
+            speeds = [] if decay.velocity is None else [(_VELOCITY, decay.velocity)]
+            parts.append((half, [(_ANGLE, decay.angle), *speeds]))
         readings = halved_readings(sources, parts, ("the first half of the travel", "the second half of the travel"))
 
         def slowing_of(at: Values, inertia: float) -> Slowing:
-            damping_rate, deceleration = (max(at[number.path], 0.0) / inertia for number in numbers)
+            damping_rate, deceleration = (max(at[number.path], 0.0) / inertia for number in (of_damping, of_friction))
             return Slowing(damping_rate, deceleration, math.expm1(at.get(_RISE, 0.0)), at.get(_RISE_VELOCITY, 0.0))
 
         def law(at: Values) -> Floats:
             slowing, series = slowing_of(at, assumed_inertia * (1.0 + at[_INERTIA])), []
             for number, decay in enumerate(decays, start=1):
-                _, swept, speed = course(decay.time, at[_START_SPEED.format(number)], slowing)
+                swept, speed = course(decay.time, at[_START_SPEED.format(number)], slowing)
                 series.append(at[_START_ANGLE.format(number)] + (1.0 + at[_GAIN]) * decay.sign * swept)
                 if decay.velocity is not None:
                     series.append(decay.sign * speed)
@@ -328,7 +308,7 @@ class FreeDecayProblem(TimedLaw):
         fit, model = solve(law, readings, variables, self.confidence)
         slowing = slowing_of(fit.by_name, assumed_inertia)
         at_rest = sum(
-            float(decay.time[-1]) > course_to_standstill(fit.by_name[_START_SPEED.format(number)], slowing).time[-1]
+            float(decay.time[-1]) > fall_to_standstill(fit.by_name[_START_SPEED.format(number)], slowing)[0][-1]
             for number, decay in enumerate(decays, start=1)
         )
         used = TIME.text(sum(float(decay.time[-1]) for decay in decays), ".3g")
@@ -345,7 +325,7 @@ class FreeDecayProblem(TimedLaw):
 
 
 def _unknowns(
-    decays: tuple[FreeDecay, ...], numbers: tuple[FitNumber, FitNumber], inertia: float, rise: float
+    decays: Sequence[FreeDecay], of_damping: FitNumber, of_friction: FitNumber, inertia: float, rise: float
 ) -> tuple[FitNumber, ...]:
     """Return damping, friction, initial angle and speed of each decay, and the rise of the friction near standstill.
 
@@ -355,7 +335,7 @@ def _unknowns(
     initial, rates = list[FitNumber](), []
     for number, decay in enumerate(decays, start=1):
         velocity, _ = smoothed_rates(decay.time, decay.angle)
-        speed = max(float(np.abs(velocity[:FEWEST_SMOOTHED]).max()), _LEAST_SPEED)
+        speed = max(float(np.abs(velocity[:_FEWEST_SMOOTHED]).max()), _LEAST_SPEED)
         swept = max(abs(float(decay.angle[-1] - decay.angle[0])), _LEAST_SWEPT)
         initial.append(sought(_START_ANGLE.format(number), float(decay.angle[0]), scale=swept))
         # The sign of the decay has the direction, so that the speed is positive.
@@ -369,14 +349,14 @@ def _unknowns(
         FitNumber(_RISE_VELOCITY, usual, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY, usual, usual),
     )
     return (
-        sought(numbers[0], inertia * damping_rate, 0.0),
-        sought(numbers[1], inertia * deceleration, 0.0),
+        sought(of_damping, inertia * damping_rate, 0.0),
+        sought(of_friction, inertia * deceleration, 0.0),
         *initial,
         *(near_rest if most > 0.0 else ()),
     )
 
 
-def _panels(decays: tuple[FreeDecay, ...], model: Floats, slowing: Slowing) -> tuple[Panel, Panel]:
+def _panels(decays: Sequence[FreeDecay], model: Floats, slowing: Slowing) -> tuple[Panel, Panel]:
     """Return two panels: angle over time, and acceleration over velocity with the straight line of equation (1)."""
     angles, rates, place = list[Mark](), list[Mark](), 0
     measured, fitted, fastest = "measured", "fitted", 0.0

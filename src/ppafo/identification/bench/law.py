@@ -256,16 +256,15 @@ def solve(
     # In the order of their first reading, so that the first block is the first recording.
     ranks = {key: rank for rank, key in enumerate(dict.fromkeys(keys))}
     # A block of the fit is a slice, so that readings of one label must lie side by side.
-    order = np.argsort([ranks[key] for key in keys], kind="stable")
-    counts = np.bincount([ranks[key] for key in keys])
-    ends = np.cumsum([0, *counts])
-    sensors = np.array(readings.sensors)
-    resolutions = {name: resolution_of(measured[sensors == name]) for name in dict.fromkeys(readings.sensors)}
+    ranked = np.array([ranks[key] for key in keys])
+    order, counts = np.argsort(ranked, kind="stable"), np.bincount(ranked)
+    ends, sensors = np.cumsum([0, *counts]), np.array(readings.sensors)
+    of_sensor = {name: measured[sensors == name] for name in dict.fromkeys(readings.sensors)}
     # A meter shows six digits at most: residuals below say nothing.
     least, blocks = 1.0e-6 * float(np.ptp(measured)), []
     for (recording, sensor, *groups), rank in ranks.items():
         rows = slice(int(ends[rank]), int(ends[rank + 1]))
-        floor = np.maximum(least, rounding_of(measured[order][rows], resolutions[sensor]))
+        floor = np.maximum(least, rounding_of(measured[order][rows], resolution_of(of_sensor[sensor])))
         blocks.append(ResidualBlock(recording, sensor, rows, floor, groups=tuple(groups)))
 
     def at(point: Floats) -> Values:
@@ -274,18 +273,17 @@ def solve(
     def residuals(points: Floats) -> Floats:
         return np.stack([(measured - law(at(point)))[order] for point in points.T], axis=1)
 
-    fitted = fit(
-        residuals, numbers, blocks, confidence, memory=min(_MEMORY, int(counts.min()) // SAMPLES_PER_COEFFICIENT)
-    )
+    memory = min(_MEMORY, int(counts.min()) // SAMPLES_PER_COEFFICIENT)
+    fitted = fit(residuals, numbers, blocks, confidence, memory=memory)
     model = law(at(fitted.values))
-    tested = (name for name in resolutions if fitted.sensors[name].order == 0)
-    for sensor in (
-        name for name in tested if fitted.sensors[name].deviation > _TELLING * float(np.ptp(measured[sensors == name]))
-    ):
+    for sensor, values in of_sensor.items():
+        noise = fitted.sensors[sensor]
+        if noise.order or not noise.deviation > _TELLING * float(np.ptp(values)):
+            continue
         series = []
         for block in (block for block in blocks if block.channel == sensor):
             samples = order[block.rows]
             by_law = samples[np.argsort(model[samples], kind="stable")]
-            series.append((measured - model)[by_law] / fitted.sensors[sensor].deviation)
+            series.append((measured - model)[by_law] / noise.deviation)
         fitted = replace(fitted, conflict=fitted.conflict or wrong_shape(sensor, series))
     return fitted, model

@@ -227,8 +227,7 @@ def check_sources(
             worst = int(np.argmax(np.abs(values)))
             if abs(values[worst]) > _LARGEST_NUMBER:
                 source.refuse(f"'{name}' is {values[worst]:g} at sample {worst + 1}: impossible")
-        if len(recording) < fewest:
-            source.refuse(f"needs at least {fewest} samples, not {len(recording)}")
+        check_enough(source, len(recording), fewest, "samples")
         for name in moving:
             check_moves(source, name)
         for name in absolute:
@@ -240,6 +239,12 @@ def check_sources(
                     f"{low + 1}, which is impossible for an absolute pressure"
                 )
             check_not_alone(source, name)
+
+
+def check_enough(source: RecordingSource, count: int, fewest: int, noun: str) -> None:
+    """Raise IdentificationError, naming the recording, for fewer than ``fewest`` samples or readings, the ``noun``."""
+    if count < fewest:
+        source.refuse(f"needs at least {fewest} {noun}, not {count}")
 
 
 def check_channels(where: str, needed: Sequence[str], read: Sequence[str]) -> None:

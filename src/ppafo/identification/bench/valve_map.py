@@ -13,21 +13,11 @@ inside the dead band.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
-from ppafo.errors import IdentificationError
-from ppafo.identification.bench.flow import (
-    VALVE,
-    ZERO,
-    FlowLaw,
-    GasAt,
-    flow_tolerances,
-    orifice_shape,
-    read_flow,
-    true_pressure,
-)
+from ppafo.identification.bench.flow import VALVE, ZERO, FlowLaw, GasAt, flow_tolerances, orifice_shape, shown_flow
 from ppafo.identification.bench.law import (
     BenchContext,
     BenchResult,
@@ -40,9 +30,9 @@ from ppafo.identification.bench.law import (
     sought,
 )
 from ppafo.identification.bench.readings import check_no_wrong_reading, check_sources, meter_readings
-from ppafo.identification.estimate import Estimate, Verdict
+from ppafo.identification.estimate import Verdict
 from ppafo.identification.fit import SHAPE, Conflict
-from ppafo.identification.least_squares import FitNumber, Flags
+from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.source import RecordingSource, pool
 from ppafo.model.effects.kind import SECTION
 from ppafo.model.effects.opening import NODES
@@ -52,9 +42,8 @@ from ppafo.report.kind import Kind
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.recording import Floats
 
-CHANNELS = ("command", "mass_flow", "upstream_pressure", "downstream_pressure")
-PRESSURES = ("upstream_pressure", "downstream_pressure")
-MINIMUM_SAMPLES = 12
+_PRESSURES = ("upstream_pressure", "downstream_pressure")
+_MINIMUM_SAMPLES = 12
 """Least number of readings to separate the unknowns of a map."""
 _MINIMUM_RANGE = 0.5
 """Least range of the command [-] to separate dead band and gain."""
@@ -66,79 +55,21 @@ _SMALL_COMMAND = 0.2
 """Typical magnitude [-] of a dead band or backlash, which may be 0."""
 _FEWEST_BETWEEN = 2
 """Least number of readings between two nodes of a table."""
-_FULL = "valve_map.full_area"
 _NEARLY_FULL = 0.95
 """Least highest command [-] from which the area at full command is found."""
+_FULL = "valve_map.full_area"
 _GAIN, _PLAY, _SATURATION = "valve_map.gain", "valve_map.hysteresis", "valve_map.saturation_command"
-_HYSTERESIS = reported(_PLAY, "", "Hysteresis: width between rising and falling command", _SMALL_COMMAND)
 _ROUND, _ROUNDS = "valve_map.round_off", (0.05, 0.005, 0.5)
 """Range over which corners of the opening are rounded, tried beside sharp ones: name, start and bounds [-]."""
 _BETTER = 5.4
 """Increase of the log-likelihood [-] by one more number that happens by chance in one fit of 1,000."""
 
 
-class _Sweep(NamedTuple):
-    """Readings of a valve: command [-], flow [kg/s], pressures [Pa], branch (1 rising, -1 falling), area [m^2].
-
-    ``is_possible`` flags the readings that can be, ``remarks`` are on the others.
-    """
-
-    command: Floats
-    flow: Floats
-    upstream: Floats
-    downstream: Floats
-    branch: Floats
-    areas: Floats
-    is_two_way: bool
-    is_possible: Flags
-    remarks: tuple[str, ...]
-
-
-def _swept(sources: tuple[RecordingSource, ...], gas: GasAt, zero: float) -> _Sweep:
-    """Return the readings. Raises IdentificationError for those that do not determine a map.
-
-    ``zero`` is the limit of the zero of the meter, as a fraction of its largest reading [-].
-    """
-    where = sources[0].where
-    check_sources(sources, CHANNELS, MINIMUM_SAMPLES, ("command", "mass_flow"), absolute=PRESSURES)
-    branches = []
-    for source in sources:
-        requested = source.recording["command"]
-        wrong = np.flatnonzero(np.abs(requested) > 1.0 + 1e-9)
-        if wrong.size:
-            source.refuse(
-                f"channel 'command' is {requested[wrong[0]]:g} at sample {wrong[0] + 1}; must be from -1 to 1"
-            )
-        # The direction of the command, 0 before its first change, is that of the last change unless recorded.
-        signs = np.sign(np.diff(requested, prepend=requested[0]))
-        last = np.maximum.accumulate(np.where(signs != 0.0, np.arange(signs.size), 0))
-        branches.append(source.recording["direction"] if "direction" in source.recording else signs[last])
-    command, upstream, downstream = (pool(sources, name) for name in CHANNELS if name != "mass_flow")
-    direction = np.sign(command * (upstream - downstream))
-    measured, is_possible, remarks = meter_readings(sources, direction, zero)
-    branch, span = np.concatenate(branches), float(np.ptp(command))
-    if span < _MINIMUM_RANGE:
-        raise IdentificationError(f"{where}: the command covers a range of {span:.3g}, not {_MINIMUM_RANGE:g} or more")
-    check_no_wrong_reading(sources, "mass_flow", (command, branch), np.ones(branch.size, dtype=bool))
-    shape = np.abs(orifice_shape(upstream, downstream, gas.heat_capacity_ratio))
-    if not shape.any():
-        raise IdentificationError(f"{where}: both pressures are equal in all readings, so nothing drives a flow")
-    # Flow over flow per area at the measured pressures, so that a sagging supply is no saturation.
-    areas = np.where(shape > 0.0, measured / (gas.choked_flow_constant * np.maximum(shape, 1e-3)), 0.0)
-    if float(command @ areas) <= 0.0:
-        raise IdentificationError(
-            f"{where}: the flow into chamber 1 falls as the command rises: a wrong sign of 'mass_flow' or 'command'"
-        )
-    # Backlash is seen where the command both rises and falls.
-    is_two_way = bool((branch > 0).any() and (branch < 0).any())
-    return _Sweep(command, measured, upstream, downstream, branch, areas, is_two_way, is_possible, remarks)
-
-
 @dataclass(frozen=True, kw_only=True)
 class ValveMapProblem(FlowLaw):
     """Table of procedure valve-map: dead band, gain, saturation and hysteresis from flow over command."""
 
-    needed = CHANNELS
+    needed = ("command", "mass_flow", *_PRESSURES)
     steady = ("valve-map",)
     kind: Literal["valve-map"]
     valve: str | None = keyed(VALVE, None)
@@ -151,35 +82,54 @@ class ValveMapProblem(FlowLaw):
         IdentificationError for recordings that do not determine the map.
         """
         gas, path = self.gas_of(sources, context), context.valve_path(self.valve)
-        sweep = _swept(sources, gas, context.tolerances.zero_of_flow)
-        command, measured, branch, is_two_way = sweep.command, sweep.flow, sweep.branch, sweep.is_two_way
-        highest = float(np.abs(command).max())
+        check_sources(sources, self.needed, _MINIMUM_SAMPLES, ("command", "mass_flow"), absolute=_PRESSURES)
+        command, upstream, downstream = (pool(sources, name) for name in ("command", *_PRESSURES))
+        direction, zero = np.sign(command * (upstream - downstream)), context.tolerances.zero_of_flow
+        measured, is_possible, remarks = meter_readings(sources, direction, zero)
+        branch, size = np.concatenate([_branch_of(source) for source in sources]), np.abs(command)
+        if (span := float(np.ptp(command))) < _MINIMUM_RANGE:
+            sources[0].refuse(f"the command covers a range of {span:.3g}, not {_MINIMUM_RANGE:g} or more")
+        check_no_wrong_reading(sources, "mass_flow", (command, branch), np.ones(branch.size, dtype=bool))
+        shape = np.abs(orifice_shape(upstream, downstream, gas.heat_capacity_ratio))
+        if not shape.any():
+            sources[0].refuse("both pressures are equal in all readings, so nothing drives a flow")
+        # Flow over flow per area at the measured pressures, so that a sagging supply is no saturation.
+        areas = np.where(shape > 0.0, measured / (gas.choked_flow_constant * np.maximum(shape, 1e-3)), 0.0)
+        if float(command @ areas) <= 0.0:
+            sources[0].refuse("the flow into chamber 1 falls as the command rises: a wrong sign of one of them")
+        # Backlash is seen where the command both rises and falls.
+        is_two_way, highest = bool((branch > 0).any() and (branch < 0).any()), float(size.max())
         band = f"{path}.dead_band"
         openings = [f"{SECTION}.opening.opening_{number:02}" for number in range(1, len(self.nodes) + 1)]
+        play = reported(_PLAY, "", "Hysteresis: width between rising and falling command", _SMALL_COMMAND)
+        pressures = dict(zip(_PRESSURES, (upstream, downstream), strict=True))
         numbers = (
-            *self._unknowns(sources[0].where, np.abs(command), np.abs(sweep.areas), band, openings),
-            # There is no backlash in commands of one direction.
-            *((sought(_HYSTERESIS, 0.02, 0.0, 0.5, 0.1),) if is_two_way else ()),
-            *flow_tolerances(gas, context.tolerances, PRESSURES, float(np.abs(measured).max())),
+            *self._unknowns(sources[0], size, np.abs(areas), band, openings),
+            *((sought(play, 0.02, 0.0, 0.5, 0.1),) if is_two_way else ()),
+            *flow_tolerances(gas, context.tolerances, pressures, measured),
         )
 
         def law(at: Values) -> Floats:
-            true_upstream = true_pressure(at, "upstream_pressure", sweep.upstream)
-            true_downstream = true_pressure(at, "downstream_pressure", sweep.downstream)
             spool = np.concatenate([spool_of(item.recording["command"], at[_PLAY]) for item in sources])
             if self.nodes:
-                area = at[_FULL] * np.sign(spool) * table_of(self.nodes, [at[name] for name in openings], np.abs(spool))
+                # Within the noise an opening may not fall.
+                rising = np.clip(np.maximum.accumulate([at[name] for name in openings]), 0.0, 1.0)
+                opening = np.interp(np.abs(spool), [0.0, *self.nodes, 1.0], [0.0, *rising.tolist(), 1.0])
+                area = at[_FULL] * np.sign(spool) * opening
             else:
                 area = area_of_command(spool, at[band], at[_GAIN], at[_SATURATION], at[_ROUND])
-            shape = np.abs(orifice_shape(true_upstream, true_downstream, gas.heat_capacity_ratio))
-            flow = read_flow(at, gas, area * gas.choked_flow_constant * shape)
+
+            def through(first: Floats, second: Floats) -> Floats:
+                shape = np.abs(orifice_shape(first, second, gas.heat_capacity_ratio))
+                return np.asarray(area * gas.choked_flow_constant * shape)
+
             # A play needs every command, so that readings that cannot be drop out of the flow alone.
-            return np.where(sweep.is_possible, flow, measured)
+            return np.asarray(np.where(is_possible, shown_flow(at, gas, pressures, through), measured))
 
         groups = (
             np.where(branch < 0.0, "falling commands", "rising commands").tolist(),
             np.where(command > 0.0, "commands to chamber 1", "commands to chamber 2").tolist(),
-            np.where(np.abs(command) > 0.5 * highest, "large commands", "small commands").tolist(),
+            np.where(size > 0.5 * highest, "large commands", "small commands").tolist(),
         )
         readings = PooledReadings(measured, ["mass_flow"] * measured.size, recordings_of(sources), groups)
         fitted, model = solve(law, readings, numbers, self.confidence)
@@ -195,64 +145,61 @@ class ValveMapProblem(FlowLaw):
                     "which gas flows from the first command on, explains them better (nodes make a table of it)"
                 )
                 fitted = replace(fitted, conflict=Conflict("mass_flow", SHAPE, math.sqrt(2.0 * gain), 0.0))
-        values, residuals = fitted.by_name, measured - model
-        scatter = np.std(residuals) / np.abs(measured).max()
-        no_play = "the command was swept in one direction only: the dead band includes half the width of any hysteresis"
-        if self.nodes:
-            found = f"a table of {len(self.nodes)} nodes, {1e6 * values[_FULL]:.4g} mm^2 at full command"
-        else:
-            found = f"dead band {values[band]:.3g}, {1e6 * values[_GAIN]:.4g} mm^2 per command"
+        if not (is_two_way or self.nodes):
+            no_play = (
+                "the command was swept in one direction only: the dead band includes half the width of any hysteresis"
+            )
+            remarks = (*remarks, no_play)
         marks = []
         for role, name, on in (("rising", "fitted", branch == 1.0), ("falling", "", branch == -1.0)):
             if on.any():
                 marks.append(readings_mark(f"command {role}", command[on], measured[on], role))
                 marks.append(curve_mark(name, command[on], model[on]))
         axes = Kind("Command"), Kind("Flow", "kg/s", "mass flow")
+        scatter = np.std(measured - model) / np.abs(measured).max()
         result = result_of(
             sources,
             fitted,
-            f"{command.size} readings; {found}; scatter {scatter:.2%} of the largest flow",
-            with_residuals("Valve map", *axes, marks, command, residuals),
+            f"{command.size} readings; scatter {scatter:.2%} of the largest flow",
+            with_residuals("Valve map", *axes, marks, command, measured - model),
             reason,
-            (*sweep.remarks, *(() if is_two_way or self.nodes else (no_play,))),
+            remarks,
         )
-        if not self.nodes:
-            # Near the highest command there is no saturation to be seen.
-            seen = [item for item in result.estimates if item.path != _SATURATION or item.value < highest - _SATURATES]
-            return replace(result, estimates=tuple(seen))
-        result = _with_nodes(result, band, self.nodes, openings)
-        remark = _of_full_opening(path, result.estimates[0], context, gas)
-        return replace(result, remarks=(*result.remarks, *filter(None, [remark])))
+        if self.nodes:
+            return self._as_table(result, path, band, openings, context, gas)
+        # Near the highest command there is no saturation to be seen.
+        seen = [item for item in result.estimates if item.path != _SATURATION or item.value < highest - _SATURATES]
+        return replace(result, estimates=tuple(seen))
 
     def _unknowns(
-        self, where: str, size: Floats, areas: Floats, band: str, openings: Sequence[str]
+        self, source: RecordingSource, size: Floats, areas: Floats, band: str, openings: Sequence[str]
     ) -> tuple[FitNumber, ...]:
         """Return the unknowns of the opening with first guesses from sizes of commands [-] and areas [m^2].
 
-        ``band`` and ``openings`` are paths of the straight line or the table. Raises IdentificationError, beginning
-        with ``where``, if the readings do not determine them.
+        ``band`` and ``openings`` are paths of the straight line or the table. Raises IdentificationError,
+        with the name of ``source``, if the readings do not determine them.
         """
         largest, highest = float(areas.max()), float(size.max())
         if self.nodes:
             ends = [0.0, *self.nodes, 1.0]
             if highest < _NEARLY_FULL:
-                raise IdentificationError(f"{where}: nodes need readings up to full command, not to {highest:.3g}")
+                source.refuse(f"nodes need readings up to full command, not to {highest:.3g}")
             rises = min(np.diff(ends)) > 0.0
             if len(self.nodes) > NODES or not rises or np.histogram(size, ends)[0].min() < _FEWEST_BETWEEN:
-                raise IdentificationError(
-                    f"{where}: nodes = {list(self.nodes)}: must rise from above 0 to below 1, at most "
-                    f"{NODES}, with {_FEWEST_BETWEEN} readings or more between two of them and the ends 0 and 1"
+                source.refuse(
+                    f"nodes = {list(self.nodes)}: must rise from above 0 to below 1, at most {NODES}, with "
+                    f"{_FEWEST_BETWEEN} readings or more between two of them and the ends 0 and 1"
                 )
-            near = [float(np.median(areas[np.argsort(np.abs(size - node))[:3]])) for node in self.nodes]
-            starts = np.clip(np.array(near) / largest, 0.0, 1.0).tolist()
             full = reported(_FULL, "m^2", "Effective area Cd A at full command")
-            return sought(full, largest, 0.0), *(
-                sought(reported(name, "", f"Opening at a command of {node:g}", 1.0), start, 0.0, 1.0, 1.0)
-                for name, node, start in zip(openings, self.nodes, starts, strict=True)
-            )
+            unknowns = [sought(full, largest, 0.0)]
+            for name, node in zip(openings, self.nodes, strict=True):
+                near = float(np.median(areas[np.argsort(np.abs(size - node))[:3]]))
+                opening = reported(name, "", f"Opening at a command of {node:g}", 1.0)
+                unknowns.append(sought(opening, min(max(near / largest, 0.0), 1.0), 0.0, 1.0, 1.0))
+            return tuple(unknowns)
         half = float(size[areas > _HALF_OPEN * largest].min())
         if not half > 0.0:
-            raise IdentificationError(f"{where}: at command 0, the valve has more than half of its largest flow")
+            source.refuse("at command 0, the valve has more than half of its largest flow")
         shut = size[areas < _SHUT * largest]
         # Inside the bounds, so that the search can go either way.
         start = float(np.clip(np.median(shut) if shut.size else 0.0, 0.01 * half, 0.9 * half))
@@ -266,49 +213,58 @@ class ValveMapProblem(FlowLaw):
             sought(saturation, 0.02 * half + 0.98 * highest, half, highest * (1.0 + 1e-9), highest),
         )
 
+    def _as_table(
+        self, result: BenchResult, path: str, band: str, openings: Sequence[str], context: BenchContext, gas: GasAt
+    ) -> BenchResult:
+        """Return the result with openings that do not fall, and beside them commands and no dead band, for a set.
 
-def _of_full_opening(path: str, full: Estimate, context: BenchContext, gas: GasAt) -> str:
-    """Return a remark on the number of the set that the full opening of a table contradicts or confirms, or ""."""
-    coefficient = context.number(f"{path}.discharge_coefficient")
-    conductance = context.number(f"{path}.sonic_conductance")
-    if not full.is_usable or not (coefficient or conductance):
-        return ""
-    if coefficient:
-        # The set has area and coefficient, of which the map knows the product alone.
-        area, own = 1e6 * full.value / coefficient, 1e6 * (context.number(f"{path}.area") or 0.0)
-        read, has = f"with the Cd of the set {path}.area = {area:.4g} mm^2", f"{own:.4g} mm^2"
-    else:
-        measured = 1e8 * full.value * gas.choked_flow_constant / gas.flow_per_sonic_conductance
-        read, has = f"{path}.sonic_conductance = {measured:.4g} L/(s bar)", f"{1e8 * (conductance or 0.0):.4g}"
-    return (
-        f"the opening is a share of the full one: {read}, and the set has {has}, which stays; no interval counts that "
-        "the opening is straight between two nodes"
-    )
+        A remark tells the number of the set that the full opening contradicts or confirms.
+        """
+        highest, (full, *others) = 0.0, result.estimates
+        nodes = [estimate for estimate in others if estimate.path in openings]
+        usable = [node.verdict for node in nodes if node.is_usable]
+        # Shut and fully open are what a node may be; a table without one of its nodes is none.
+        is_whole = all(node.is_usable or node.verdict == "at its bound" for node in nodes)
+        of_bound: Verdict = usable[0] if usable else "at its bound"
+        table = []
+        for number, (node, command) in enumerate(zip(nodes, self.nodes, strict=True), 1):
+            highest = max(highest, node.value)
+            verdict: Verdict = (node.verdict if node.is_usable else of_bound) if is_whole else "not identifiable"
+            beside = {f"{SECTION}.opening.command_{number:02}": command, band: 0.0}
+            low, high = min(node.low, highest), max(node.high, highest)
+            table.append(replace(node, value=highest, low=low, high=high, beside=beside, verdict=verdict))
+        result = replace(result, estimates=(full, *table, *others[len(nodes) :]))
+        names = ("discharge_coefficient", "sonic_conductance", "area")
+        coefficient, conductance, area = (context.number(f"{path}.{name}") for name in names)
+        if not full.is_usable or not (coefficient or conductance):
+            return result
+        if coefficient:
+            # The set has area and coefficient, of which the map knows the product alone.
+            read = f"with the Cd of the set {path}.area = {1e6 * full.value / coefficient:.4g} mm^2"
+            has = f"{1e6 * (area or 0.0):.4g} mm^2"
+        else:
+            measured = 1e8 * full.value * gas.choked_flow_constant / gas.flow_per_sonic_conductance
+            read, has = f"{path}.sonic_conductance = {measured:.4g} L/(s bar)", f"{1e8 * (conductance or 0.0):.4g}"
+        remark = (
+            f"the opening is a share of the full one: {read}, and the set has {has}, which stays; no interval counts "
+            "that the opening is straight between two nodes"
+        )
+        return replace(result, remarks=(*result.remarks, remark))
 
 
-def table_of(nodes: Sequence[float], openings: Sequence[float], size: Floats) -> Floats:
-    """Return the opening [-] of a table for sizes of the command [-]; within the noise an opening may not fall."""
-    rising = np.clip(np.maximum.accumulate(openings), 0.0, 1.0)
-    return np.asarray(np.interp(size, [0.0, *nodes, 1.0], [0.0, *rising.tolist(), 1.0]))
+def _branch_of(source: RecordingSource) -> Floats:
+    """Return the direction of the command, 1 rising and -1 falling; unless recorded, it is that of the last change.
 
-
-def _with_nodes(result: BenchResult, band: str, nodes: Sequence[float], openings: Sequence[str]) -> BenchResult:
-    """Return the result with openings that do not fall, and beside them commands and no dead band, for a set."""
-    highest, estimates = 0.0, {estimate.path: estimate for estimate in result.estimates}
-    usable = [estimates[path].verdict for path in openings if estimates[path].is_usable]
-    # Shut and fully open are what a node may be; a table without one of its nodes is none.
-    is_whole = all(estimates[path].is_usable or estimates[path].verdict == "at its bound" for path in openings)
-    of_bound: Verdict = usable[0] if usable else "at its bound"
-    unknown: Verdict = "not identifiable"
-    for number, (path, node) in enumerate(zip(openings, nodes, strict=True), 1):
-        found = estimates[path]
-        highest = max(highest, found.value)
-        beside = {f"{SECTION}.opening.command_{number:02}": node, band: 0.0}
-        verdict = found.verdict if found.is_usable else of_bound
-        low, high = min(found.low, highest), max(found.high, highest)
-        found = replace(found, value=highest, low=low, high=high, beside=beside)
-        estimates[path] = replace(found, verdict=verdict if is_whole else unknown)
-    return replace(result, estimates=tuple(estimates.values()))
+    Raises IdentificationError for a command beyond -1 or 1.
+    """
+    requested = source.recording["command"]
+    wrong = np.flatnonzero(np.abs(requested) > 1.0 + 1e-9)
+    if wrong.size:
+        source.refuse(f"channel 'command' is {requested[wrong[0]]:g} at sample {wrong[0] + 1}; must be from -1 to 1")
+    # Before the first change it is 0.
+    signs = np.sign(np.diff(requested, prepend=requested[0]))
+    last = np.maximum.accumulate(np.where(signs != 0.0, np.arange(signs.size), 0))
+    return source.recording["direction"] if "direction" in source.recording else np.asarray(signs[last])
 
 
 def area_of_command(
@@ -318,11 +274,11 @@ def area_of_command(
 
     With ``round_off`` [-] both corners are rounded over about this range of the command, and gas flows from 0 on.
     """
-    size = np.abs(command)
+    size, ends = np.abs(command), np.array([[dead_band], [saturation]])
     if round_off > 0.0:
-        ends = [round_off * np.logaddexp(0.0, (size - end) / round_off) for end in (dead_band, saturation)]
-        at_zero = [round_off * float(np.logaddexp(0.0, -end / round_off)) for end in (dead_band, saturation)]
-        beyond = (ends[0] - at_zero[0]) - (ends[1] - at_zero[1])
+        rounded = round_off * np.logaddexp(0.0, (size - ends) / round_off)
+        first, second = rounded - round_off * np.logaddexp(0.0, -ends / round_off)
+        beyond = first - second
     else:
         beyond = np.clip(size - dead_band, 0.0, max(saturation - dead_band, 0.0))
     return np.asarray(np.sign(command) * gain * beyond)

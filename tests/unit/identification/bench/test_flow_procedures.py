@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.flow import GasAt, Opening, OpeningSizes, iso6358_shape, orifice_shape
+from ppafo.identification.bench.flow import GasAt, Opening, iso6358_shape, orifice_shape
 from ppafo.identification.bench.vane_leak import pressures_of_fall
 from ppafo.identification.noise import burg
 from ppafo.identification.source import RecordingSource
@@ -91,7 +91,7 @@ def test_the_drawn_curve_has_the_zero_of_the_meter_as_the_residuals_have() -> No
 def test_a_laminar_valve_gives_back_its_coefficient() -> None:
     source = planted.flow()
     pressures = source.recording["upstream_pressure"], source.recording["downstream_pressure"]
-    flow = Opening(planted.CO2, "laminar").flow(OpeningSizes(3.0e-14), *pressures)
+    flow = Opening(planted.CO2, "laminar").flow({"size": 3.0e-14}, *pressures)
     laminar = changed(source, "mass_flow", flow * (1.0 + np.random.default_rng(1).normal(0.0, 0.003, flow.size)))
     found = open_valve_flow((laminar,), planted.CO2, law="laminar")
     assert found["open_valve_flow.laminar_coefficient"].value == pytest.approx(3.0e-14, rel=0.01)
@@ -287,11 +287,13 @@ def test_a_steady_orifice_leak_gives_its_area_beside_the_zero_of_the_meter() -> 
         area = vane_leak((planted.steady("orifice", EFFECTIVE, zero),), planted.CO2, discharge_coefficient=0.113)[AREA]
         assert area.low <= 0.3e-6 <= area.high
         assert area.verdict == "identified"
+    with pytest.raises(IdentificationError, match=r"'mass_flow': .* of procedure vane-leak-steady"):
+        planted.in_gas("vane-leak", (planted.steady("orifice", EFFECTIVE),), planted.CO2, EXACT, {})
 
 
 def test_a_leak_in_the_form_of_the_standard_gives_its_conductance() -> None:
     first, second = np.linspace(1.3e5, 6.0e5, 24), np.full(24, planted.ROOM)
-    flow = Opening(planted.CO2, "iso6358", 1.0, 0.25).flow(OpeningSizes(7.0e-11), first, second)
+    flow = Opening(planted.CO2, "iso6358", critical_ratio=0.25).flow({"size": 7.0e-11}, first, second)
     flow *= 1.0 + np.random.default_rng(3).normal(0.0, 0.003, 24)
     channels = {"pressure_1": (first, "Pa"), "pressure_2": (second, "Pa"), "mass_flow": (flow, "kg/s")}
     source = planted.source("steady", np.arange(24.0), **channels)
@@ -301,9 +303,9 @@ def test_a_leak_in_the_form_of_the_standard_gives_its_conductance() -> None:
 
 
 def test_choked_outflow_of_one_chamber_into_a_room_is_an_exponential_of_the_pressure() -> None:
-    opening = Opening(planted.CO2, "orifice", 1.0 / planted.CO2.choked_flow_constant)
+    opening = Opening(planted.CO2, "orifice", known=1.0 / planted.CO2.choked_flow_constant)
     time = np.linspace(0.0, 3.0, 50)
-    first, _ = pressures_of_fall(opening, OpeningSizes(0.2), 1e6, 1e5, 0.0, 1.0, time)
+    first, _ = pressures_of_fall(opening, {"size": 0.2}, 1e6, 1e5, 0.0, 1.0, time)
     assert np.allclose(first, 1e6 * np.exp(-0.2 * time), rtol=1e-4)
 
 

@@ -15,7 +15,7 @@ from tests.unit.identification.planted import free_decay
 
 def test_the_course_is_that_of_the_closed_form_and_ends_at_rest() -> None:
     time = np.linspace(0.0, 8.0, 801)
-    _, swept, speed = course(time, 3.0, Slowing(0.7, 0.5))
+    swept, speed = course(time, 3.0, Slowing(0.7, 0.5))
     assert np.allclose(swept, planted.angle_of_decay(time, 0.0, 3.0, 0.7, 0.5), atol=1e-6)
     assert np.allclose(speed, np.gradient(swept, time), atol=0.02)
     assert speed[-1] == pytest.approx(0.0, abs=1e-9)
@@ -23,7 +23,7 @@ def test_the_course_is_that_of_the_closed_form_and_ends_at_rest() -> None:
 
 def test_friction_that_rises_near_standstill_satisfies_the_equation_of_motion() -> None:
     time = np.linspace(0.0, 2.0, 20001)
-    _, swept, _ = course(time, 3.0, Slowing(0.7, 0.5, 4.0, 0.3))
+    swept, _ = course(time, 3.0, Slowing(0.7, 0.5, 4.0, 0.3))
     speed = np.gradient(swept, time)
     slope = np.gradient(speed, time)
     moving = (speed > 0.05) & (time > 0.001)
@@ -33,10 +33,8 @@ def test_friction_that_rises_near_standstill_satisfies_the_equation_of_motion() 
 
 def test_a_decay_without_damping_or_without_friction_stays_finite() -> None:
     time = np.linspace(0.0, 4.0, 50)
-    assert course(time, 3.0, Slowing(0.0, 0.5)).swept[10] == pytest.approx(
-        3.0 * time[10] - 0.25 * time[10] ** 2, rel=1e-6
-    )
-    assert course(time, 3.0, Slowing(1.0, 0.0)).swept[10] == pytest.approx(3.0 * (1.0 - np.exp(-time[10])), rel=1e-5)
+    assert course(time, 3.0, Slowing(0.0, 0.5))[0][10] == pytest.approx(3.0 * time[10] - 0.25 * time[10] ** 2, rel=1e-6)
+    assert course(time, 3.0, Slowing(1.0, 0.0))[0][10] == pytest.approx(3.0 * (1.0 - np.exp(-time[10])), rel=1e-5)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -84,7 +82,7 @@ def test_an_uncertain_inertia_widens_what_depends_on_it() -> None:
 
 def test_a_seal_that_grips_near_standstill_does_not_move_damping_out_of_its_interval() -> None:
     time = np.arange(0.0, 4.0, 0.005)
-    swept = course(time, 6.0, Slowing(3.8, 1.3, 35.0, 0.05)).swept
+    swept, _ = course(time, 6.0, Slowing(3.8, 1.3, 35.0, 0.05))
     angle = 0.4 + swept + np.random.default_rng(4).normal(0.0, 2e-3, time.size)
     source = planted.source("grips", time, angle=(angle, "rad"))
     narrow, wide = (free_decay((source,), start="0 s", rise=rise) for rise in (0.0, 40.0))
@@ -154,7 +152,7 @@ def with_velocity(factor: float = 1.0) -> RecordingSource:
     source = planted.decay()
     time = source.recording.time
     slowing = Slowing(planted.DAMPING_RATE, planted.DECELERATION)
-    speed = course(np.maximum(time - 1.0, 0.0), 2.5, slowing).speed
+    _, speed = course(np.maximum(time - 1.0, 0.0), 2.5, slowing)
     speed = np.where(time < 1.0, 0.0, speed) + np.random.default_rng(51).normal(0.0, 0.003, time.size)
     return RecordingSource(source.recording.with_channel("angular_velocity", factor * speed, "rad/s"))
 
