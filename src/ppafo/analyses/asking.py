@@ -22,15 +22,7 @@ from ppafo.simulation.tracking.remarks import standing_still
 from ppafo.simulation.tracking.remedies import change_text
 from ppafo.simulation.tracking.rule import CRITERION_TEXTS, shortfall
 from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import (
-    FEWEST_DRAWS,
-    MAXIMUM_DRAWS,
-    REPLICATES,
-    Uncertainty,
-    seeds_of_noise,
-    study_of,
-    uncertainty_of,
-)
+from ppafo.studies.draws import FEWEST_DRAWS, MAXIMUM_DRAWS, REPLICATES, Uncertainty, seeds_of_noise, uncertainty_of
 from ppafo.studies.intervals import (
     effective_sample_size,
     fraction_text,
@@ -40,9 +32,9 @@ from ppafo.studies.intervals import (
     share_interval,
 )
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, level_of
-from ppafo.studies.sampling import with_new_noise
+from ppafo.studies.loading import study_of
 from ppafo.studies.study import DEFAULT_SEED, changes_of, choose_configurations, configurations_with, with_overrides
-from ppafo.studies.varying import VariedPath, distribution_in, given_in, value_at, varied_path
+from ppafo.studies.varying import VariedPath, distribution_in, value_at, varied_path
 from ppafo.study.blocks import unvaried
 from ppafo.study.runs import FAILED, Rows, RunCounter, scenario_runs
 from ppafo.units import split_quantity

@@ -309,9 +309,6 @@ def _drawn_runs(
         return {}
     count, seed, maximum_failed = draws
     columns, drawn = uncertainty.replicated_columns(count, seed), dict[tuple[str, str], ask.Rows]()
-    if uncertainty.has_noise:
-        again = ask.with_new_noise(columns)
-        columns = {path: np.concatenate([column, again[path]]) for path, column in columns.items()}
     counter = ask.RunCounter(max(map(len, columns.values())) * len(scenarios), progress)
     for (task, name), scenario in scenarios.items():
         runs = ask.scenario_runs(scenario, metrics, counter, uncertainty.gauge, threads)

@@ -41,6 +41,7 @@ from ppafo.study.store import (
     OSCILLATES,
     STATUSES,
     StudyFolder,
+    chunk_file,
     read_manifest,
     stored_unit,
     study_folder,
@@ -180,10 +181,7 @@ class StudyResults:
 
     def bands(self) -> Columns:
         """Return quantile bands over time as columns: configuration, channel, time, and a column for each quantile."""
-        table, path = self.folder.table(BANDS), self.folder.path / BANDS
-        if hashlib.sha256(path.read_bytes()).hexdigest() != self.summary[BANDS]:
-            raise DataError(f"{path}: is missing or damaged; run the study again into this folder")
-        return as_numpy(table)
+        return as_numpy(self.folder.table(BANDS, digest=self.summary.get(BANDS)))
 
     def thin(self, column: str, maximum: int) -> Columns:
         """Return a column by name of the configuration, thinned to every n-th run for about ``maximum`` runs in all."""
@@ -203,7 +201,7 @@ class StudyResults:
         if configuration is not None:
             of_each = len(numbers) // len(self.configurations)
             numbers = numbers[of_each * self.configurations.index(configuration) :][:of_each]
-        return self.folder.tables(numbers, columns)
+        return (self.folder.table(chunk_file(number), columns) for number in numbers)
 
     def _matrix(self, channel: str, configuration: str | None = None, samples: slice = slice(None)) -> Floats:
         column = trace_column(channel)

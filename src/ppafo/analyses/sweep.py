@@ -82,7 +82,7 @@ def sweep(
     from ppafo.analyses.study_results import SUMMARY, StudyResults, finding_of, summarise
     from ppafo.simulation.gains import warn_of_gains
     from ppafo.storage.files import temporary_folder
-    from ppafo.studies.draws import study_of
+    from ppafo.studies.loading import study_of
     from ppafo.studies.study import check_can_be_swept
     from ppafo.study.executing import computed_by, executor_of
     from ppafo.study.runs import RunCounter
@@ -151,7 +151,7 @@ def sweep_into_folder(
     """
     from ppafo.report.drawing import load_drawing
     from ppafo.report.finding import page_files, text_of
-    from ppafo.studies.draws import study_of
+    from ppafo.studies.loading import study_of
     from ppafo.study.store import study_folder
 
     # A module imported below may import Matplotlib, slowly: load_drawing imports it first, without its slow parts.

@@ -44,7 +44,7 @@ from ppafo.studies.draws import Uncertainty, uncertainty_of
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, difference_of, level_of
 from ppafo.studies.loading import list_studies, load_study, read_source
 from ppafo.studies.study import with_overrides
-from ppafo.studies.varying import VariedPath, distribution_in, given_in, in_its_unit, value_at, varied_path
+from ppafo.studies.varying import VariedPath, distribution_in, value_at, varied_path
 from ppafo.study.runs import Rows, RunCounter, scenario_runs
 from ppafo.units.shown import in_units, quantity_of_unit
 from ppafo.wording import count_of, first_twice, percentage, without_exponent
@@ -409,12 +409,11 @@ def _metric_limit(constraint: Constraint, atmosphere: float | None) -> MetricLim
 
 def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) -> SearchedParameter:
     """Return a searched parameter with its range in SI; StudyError for a path or bounds that cannot be searched."""
-    kind, ends = "log_uniform" if gain.spacing == "logarithmic" else "uniform", (gain.minimum, gain.maximum)
+    kind = "log_uniform" if gain.spacing == "logarithmic" else "uniform"
     with refused_as(StudyError, f"search '{gain.path}'", UnitError, ScenarioError, StudyError):
         if gain.path == NOISE_SEED:
             raise StudyError("cannot be searched, because all candidates use the same noise; omit this search")
-        place = varied_path(gain.path, scenario)
-        place = given_in(in_its_unit(place, ends) if atmosphere_varies else place, ends)
+        place = varied_path(gain.path, scenario, (gain.minimum, gain.maximum), atmosphere_varies)
         between = distribution_in({"kind": kind, "minimum": gain.minimum, "maximum": gain.maximum}, place)
         if (before := value_at(gain.path, scenario)) is None:
             raise StudyError(

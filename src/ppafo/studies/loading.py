@@ -1,7 +1,7 @@
 """Loading of a study by name, file or plain data into SI units, with a one-line error for each mistake."""
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
@@ -31,7 +31,7 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import changes_in, chosen_path
 from ppafo.studies.declaration import NOT_RANDOM, SAME_AS, ConfigurationSection, Correlation, StudyFile
-from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, with_noise
+from ppafo.studies.draws import MAXIMUM_SOBOL_DIMENSIONS, Factor, Uncertainty, cholesky_factor, uncertainty_of
 from ppafo.studies.study import (
     DEFAULT_SEED,
     NO_SAMPLE,
@@ -46,8 +46,6 @@ from ppafo.studies.study import (
 from ppafo.studies.varying import (
     VariedPath,
     axis_or_distribution,
-    given_in,
-    in_its_unit,
     stated_normal,
     texts_of,
     varied_path,
@@ -121,29 +119,63 @@ def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[
     return kind.parse(source.text, source.file), source
 
 
-def load_configuration(
-    study: str | Path | Mapping[str, Any], configuration: Configuration, changes: Overrides
+def study_of(
+    study: Study | str | Path | Mapping[str, Any],
+    overrides: Iterable[str] = (),
+    draws: int | None = None,
+    seed: int | None = None,
 ) -> Study:
-    """Load a study with a single one of its configurations, to which the changes are applied.
+    """Load a study by name, file or data; return a loaded study unchanged, with StudyError for changes to it."""
+    if not isinstance(study, Study):
+        return load_study(study, overrides, draws=draws, seed=seed)
+    if tuple(overrides) or draws is not None or seed is not None:
+        raise StudyError("a loaded Study accepts no overrides, draws or seed; give these to load_study")
+    return study
 
-    Paths, correlations and metrics that the configuration does not have are left out. Raises StudyError for changes
-    that the configuration refuses.
+
+def drawn_in(
+    study: Study | str | Path | Mapping[str, Any], overrides: Iterable[str], name: str | None, independent: bool = False
+) -> tuple[Study, Configuration, Uncertainty]:
+    """Return a study, one of its configurations, and the distributions in this configuration, with sensor noise.
+
+    ``independent`` omits the correlations; overrides change the chosen configuration only. Raises StudyError for a name
+    that is missing or unknown, for changes that the configuration refuses, and where nothing has a distribution.
     """
-    document, source = read_source(STUDY_FILES, study)
-    name, scenario = configuration.name, configuration.scenario
-    document["configurations"] = [table for table in document["configurations"] if table["name"] == name]
-    varied = [table for table in document.get("vary", ()) if name in table.pop("only", [name])]
-    paths = {table["path"] for table in varied}
-    document["vary"] = [table for table in varied if table.get("same_as", table["path"]) in paths]
-    document["correlations"] = [
-        table for table in document.get("correlations", ()) if paths.issuperset(table["between"])
-    ]
-    # Traces are of no use where one configuration is drawn from.
-    metrics = document.get("outputs", {}).get("metrics", [])
-    if metrics != "all":
-        metrics = [metric for metric in metrics if not lacking(scenario, METRICS[metric])]
-    document["outputs"] = {"metrics": metrics}
-    return _load(document, source, tuple(changes))
+    changes = tuple(overrides)
+    chosen = study_of(study, changes if isinstance(study, Study) else ())
+    configurations = {configuration.name: configuration for configuration in chosen.configurations}
+    if name is None and len(configurations) > 1:
+        raise StudyError(f"study '{chosen.name}' has several configurations; choose one: {', '.join(configurations)}")
+    name = next(iter(configurations)) if name is None else name
+    if name not in configurations:
+        raise StudyError(f"study '{chosen.name}' has no configuration '{name}'{known_names(name, configurations)}")
+    base = configurations[name]
+    if changes and not isinstance(study, Study):
+        # The configuration alone, as the others may refuse the changes; without what it does not have.
+        document, source = read_source(STUDY_FILES, study)
+        document["configurations"] = [table for table in document["configurations"] if table["name"] == name]
+        varied = [table for table in document.get("vary", ()) if name in table.pop("only", [name])]
+        paths = {table["path"] for table in varied}
+        document["vary"] = [table for table in varied if table.get(SAME_AS, table["path"]) in paths]
+        pairs = document.get("correlations", ())
+        document["correlations"] = [table for table in pairs if paths.issuperset(table["between"])]
+        metrics = [metric for metric in chosen.outputs.metrics if not lacking(base.scenario, METRICS[metric])]
+        document["outputs"] = {"metrics": metrics}
+        chosen = _load(document, source, changes)
+        base = chosen.configurations[0]
+    whole = uncertainty_of(chosen)
+    kept = [row for row, drawn in enumerate(whole.drawn) if chosen.varies(drawn.path, name)]
+    if not kept:
+        raise StudyError(f"study '{chosen.name}': no value has a distribution in configuration '{name}'")
+    scores = None if independent else whole.scores
+    if scores is not None and len(kept) < len(whole.drawn):
+        # Rows of a factor are no factor of the correlation among some paths: that is factored anew.
+        lower = np.asarray(scores)
+        factor = np.linalg.cholesky((lower @ lower.T)[np.ix_(kept, kept)])
+        scores = tuple(map(tuple, factor.tolist()))
+    drawn = tuple(whole.drawn[row] for row in kept)
+    used = Uncertainty(drawn, scores, chosen.same_in(name), chosen.gauge)
+    return chosen, base, used.with_noise_of([base.scenario])
 
 
 def _load(
@@ -186,51 +218,65 @@ def _build(parsed: StudyFile, document: dict[str, Any], source: _StudySource, ch
     for section in sections:
         with noted_in(wrong):
             configurations.append(_configuration(section, source.folder))
-    if (repeated := first_twice([section.name for section in sections])) is not None:
-        wrong.append(
-            StudyError(f"two configurations are named '{repeated}'; give every configuration a different name")
-        )
+    unique = {
+        "two configurations are named '{}'; give every configuration a different name": [
+            each.name for each in sections
+        ],
+        "'{}' is varied twice; omit one [[vary]]": paths,
+    }
+    wrong += [StudyError(text.format(twice)) for text, names in unique.items() if (twice := first_twice(names))]
     if not paths and len(sections) == 1:
         wrong.append(StudyError("varies nothing: give at least one [[vary]] or a second configuration"))
     # Rows of channels over time are lists of one length, and bands are quantiles at one time.
     if "run.duration" in paths and parsed.outputs.traces:
         said = "'run.duration' cannot vary with trajectories or bands, which need runs of equal length"
         wrong.append(StudyError(said))
-    if (repeated := first_twice(paths)) is not None:
-        wrong.append(StudyError(f"'{repeated}' is varied twice; omit one [[vary]]"))
     # All else is about the scenarios.
     raise_noted(wrong)
-    scenarios, outputs = [configuration.scenario for configuration in configurations], None
-    varied_paths, independent = dict[str, VariedPath](), list[Axis | RandomValue]()
+    scenarios = [configuration.scenario for configuration in configurations]
+    varied, independent = dict[str, VariedPath](), list[Axis | RandomValue]()
+    followed = {entry["path"]: entry[SAME_AS] for entry in vary if entry["kind"] == SAME_AS}
     for entry in vary:
         with noted_in(wrong):
-            varied_paths[entry["path"]], values = _varied(entry, configurations, ATMOSPHERE_PATH in paths)
+            varied[entry["path"]], values = _varied(entry, configurations, ATMOSPHERE_PATH in paths)
             independent += [] if values is None else [values]
         for section, configuration in zip(sections, configurations, strict=True):
             with noted_in(wrong):
                 _check_not_set(entry, section, configuration)
-    followed = {entry["path"]: entry[SAME_AS] for entry in vary if entry["kind"] == SAME_AS}
     for path, other in followed.items():
-        with noted_in(wrong):
-            _check_followed(path, other, [each for each in paths if each not in followed], varied_paths)
-    drawn, scores, sample = tuple(each for each in independent if isinstance(each, RandomValue)), None, None
+        said, leading = f"vary '{path}': same_as = '{other}'", [each for each in paths if each not in followed]
+        # A path that is refused itself has no unit.
+        units = [varied[each].quantity.unit or "-" for each in (path, other) if each in varied]
+        if other not in leading:
+            hint = known_names(other, leading)
+            wrong.append(StudyError(f"{said} must be the path of another [[vary]] without same_as{hint}"))
+        elif len(set(units)) > 1:
+            both = f"{said} has the unit '{units[1]}', but '{path}' has '{units[0]}'; both need the same unit"
+            wrong.append(StudyError(both))
+    uncertainty = Uncertainty(tuple(each for each in independent if isinstance(each, RandomValue)))
     random = [entry["path"] for entry in vary if entry["kind"] not in NOT_RANDOM]
     with noted_in(wrong):
-        scores = _scores(parsed.correlations, random)
+        uncertainty = replace(uncertainty, scores=_scores(parsed.correlations, random))
+    outputs, sample = parsed.outputs, parsed.sample
     with noted_in(wrong):
-        outputs = valid_outputs(parsed.outputs, scenarios)
+        outputs = valid_outputs(outputs, scenarios)
     # A grid alone is run once, with the noise that its scenarios write.
-    if drawn and not wrong:
-        drawn, scores = with_noise(drawn, scores, scenarios, paths)
-    with noted_in(wrong):
-        sample = _sample(parsed.sample, drawn or random)
+    if uncertainty.drawn and not wrong:
+        uncertainty = uncertainty.with_noise_of(scenarios, paths)
+    drawn = uncertainty.drawn
+    if sample is not None and not random:
+        wrong.append(StudyError("[sample] is given, but no value has a distribution; omit [sample]"))
+    # The direction numbers of SciPy's sequence end there.
+    elif sample is not None and sample.method == "sobol" and len(drawn) > MAXIMUM_SOBOL_DIMENSIONS:
+        wrong.append(StudyError(f"sample.method = 'sobol' allows at most {MAXIMUM_SOBOL_DIMENSIONS} distributions"))
     raise_noted(wrong)
-    assert outputs is not None and sample is not None, "else refused above"  # noqa: PT018 - both or neither
     # The noise, which has no [[vary]] table, is a plain number.
-    plain = {number.path: "-" for number in drawn}
-    given = {path: varied.given for path, varied in varied_paths.items() if varied.given}
+    units_of = {number.path: "-" for number in drawn} | {
+        path: each.quantity.unit or "-" for path, each in varied.items()
+    }
+    given = {path: each.given for path, each in varied.items() if each.given}
     # A number that follows a gauge pressure counts from the atmosphere of its run as well.
-    gauge = {path for path, varied in varied_paths.items() if varied.is_gauge}
+    gauge = {path for path, each in varied.items() if each.is_gauge}
     return Study(
         name=parsed.name,
         description=" ".join(parsed.description.split()),
@@ -238,12 +284,13 @@ def _build(parsed: StudyFile, document: dict[str, Any], source: _StudySource, ch
         axes=tuple(axis for axis in independent if isinstance(axis, Axis)),
         drawn=drawn,
         same=followed,
-        scores=scores,
-        sample=sample,
+        scores=uncertainty.scores,
+        # One run at each point of a grid; a seed is enough where something else draws, such as a sensitivity analysis.
+        sample=sample or SamplingPlan(None, 1, DEFAULT_SEED if drawn else 0),
         outputs=outputs,
         runs_of_chunk=parsed.runs_of_chunk,
-        units=plain | {path: varied.quantity.unit or "-" for path, varied in varied_paths.items()},
-        given={path: unit for path, unit in given.items() if unit != shown_unit(varied_paths[path].quantity.unit, {})},
+        units=units_of,
+        given={path: unit for path, unit in given.items() if unit != shown_unit(varied[path].quantity.unit, {})},
         gauge=frozenset(gauge | {path for path, other in followed.items() if other in gauge}),
         only={entry["path"]: entry["only"] for entry in vary if entry.get("only")},
         document=document,
@@ -268,23 +315,21 @@ def _varied(
             if name not in names:
                 raise UnitError(f"only: there is no configuration '{name}'{known_names(name, names)}")
         scenarios = [each.scenario for each in configurations if not only or each.name in only]
-        varied, *others = (varied_path(path, scenario) for scenario in scenarios)
+        texts = texts_of(entry)
+        varied, *others = (varied_path(path, scenario, texts, atmosphere_varies) for scenario in scenarios)
         if any(other != varied for other in others):
             raise UnitError("differs in unit, limits or atmosphere between configurations; use 'only'")
-        varied = given_in(varied, texts_of(entry))
         if entry["kind"] == SAME_AS:
             return varied, None
-        stated = [stated_normal(varied, each) for each in scenarios] if entry["kind"] == "stated" else []
-        # Where the atmosphere is fixed, gauge is a constant away from absolute; else each run has its own zero.
-        if atmosphere_varies:
-            varied = in_its_unit(varied, [f"0 {stated[0][1]}"] if stated else texts_of(entry))
-        if not stated:
+        if entry["kind"] != "stated":
             return varied, axis_or_distribution(entry, varied)
+        (distribution, unit), *more = (stated_normal(varied, each) for each in scenarios)
         # One draw is run in every configuration, so all of them must mean the same distribution.
-        if len({distribution for distribution, _ in stated}) > 1:
+        if any(other != distribution for other, _ in more):
             raise UnitError("the parameter sets of the configurations state different values; use 'only'")
-        zero = varied.atmosphere if varied.is_gauge else 0.0
-        return varied, RandomValue(path, replace(stated[0][0], zero=zero))
+        is_gauge = varied_path(path, scenarios[0], [f"0 {unit}"], atmosphere_varies).is_gauge
+        zero = varied.atmosphere if is_gauge else 0.0
+        return replace(varied, is_gauge=is_gauge), RandomValue(path, replace(distribution, zero=zero))
 
 
 def _check_not_set(entry: Mapping[str, Any], section: ConfigurationSection, configuration: Configuration) -> None:
@@ -301,18 +346,6 @@ def _check_not_set(entry: Mapping[str, Any], section: ConfigurationSection, conf
             f"configuration '{configuration.name}': '{set_values[ignored]}' is set and '{entry['path']}' is varied: "
             "omit one of them, or restrict the [[vary]] to other configurations with 'only'"
         )
-
-
-def _check_followed(path: str, other: str, independent: Sequence[str], varied: Mapping[str, VariedPath]) -> None:
-    """Raise StudyError for a path that takes the values of a fixed one, or of one with another unit."""
-    said = f"vary '{path}': same_as = '{other}'"
-    if other not in independent:
-        known = known_names(other, independent)
-        raise StudyError(f"{said} must be the path of another [[vary]] without same_as{known}")
-    # A path that is refused itself has no unit.
-    units = [varied[each].quantity.unit or "-" for each in (path, other) if each in varied]
-    if len(set(units)) > 1:
-        raise StudyError(f"{said} has the unit '{units[1]}', but '{path}' has '{units[0]}'; both need the same unit")
 
 
 def _scores(correlations: Sequence[Correlation], paths: Sequence[str]) -> Factor | None:
@@ -341,16 +374,3 @@ def _scores(correlations: Sequence[Correlation], paths: Sequence[str]) -> Factor
             f"correlations: the correlation matrix is not positive definite ({shown}); reduce the coefficients"
         )
     return factor
-
-
-def _sample(plan: SamplingPlan | None, drawn: Sequence[object]) -> SamplingPlan:
-    """Return the sampling plan of the distributions; without distributions, one run at each point of the grid."""
-    if not drawn:
-        if plan is not None:
-            raise StudyError("[sample] is given, but no value has a distribution; omit [sample]")
-        return SamplingPlan(None, 1, 0)
-    # The direction numbers of SciPy's sequence end there.
-    if plan is not None and plan.method == "sobol" and len(drawn) > MAXIMUM_SOBOL_DIMENSIONS:
-        raise StudyError(f"sample.method = 'sobol' allows at most {MAXIMUM_SOBOL_DIMENSIONS} distributions")
-    # Enough where something else draws, such as a sensitivity analysis.
-    return plan or SamplingPlan(None, 1, DEFAULT_SEED)

@@ -81,8 +81,15 @@ class VariedPath:
         return float(value)
 
 
-def varied_path(path: str, scenario: Scenario) -> VariedPath:
-    """Look up a path in a scenario; ScenarioError with the nearest name for an unknown path."""
+def varied_path(
+    path: str, scenario: Scenario, texts: Iterable[object] = (), atmosphere_varies: bool = False
+) -> VariedPath:
+    """Look up a path in a scenario, of which ``texts`` are values; ScenarioError with the nearest name if unknown.
+
+    It is shown in the first unit of the texts, unless a number needs a power of ten there, such as 1.451e-5 m^3. Where
+    the atmosphere varies, gauge pressures such as ``50 psi_g`` are relative to the atmosphere of each run; raises
+    UnitError for a mix of gauge and absolute pressures.
+    """
     find_effects([path])
     known = declared_numbers(scenario)
     if path not in known:
@@ -90,7 +97,17 @@ def varied_path(path: str, scenario: Scenario) -> VariedPath:
         near = [name for name in known if name.startswith(f"{section}.")]
         hint = nearest_name(path, known) or f"; for example {', '.join(near[:6] or list(known)[:6])}"
         raise ScenarioError(f"scenario '{scenario.name}' has no numeric value '{path}'{hint}")
-    return VariedPath(path, known[path], counts_from(path, scenario.device.supply.atmospheric_pressure))
+    quantity, texts = known[path], list(texts)
+    number, given = next((split_quantity(str(text)) for text in texts if unit_in(text)), (0.0, ""))
+    is_plain = number == 0.0 or _SMALLEST_SHOWN <= abs(number) < _LARGEST_SHOWN
+    units = [split_quantity(text)[1] for text in texts if isinstance(text, str)]
+    gauge = [bool(gauge_link(path, 0.0, unit)) for unit in units]
+    is_gauge = atmosphere_varies and quantity.unit == "Pa_a" and any(gauge)
+    if is_gauge and not all(gauge):
+        other = units[gauge.index(not gauge[0])]
+        raise UnitError(f"the atmosphere varies, so '{units[0]}' and '{other}' cannot be mixed")
+    atmosphere = counts_from(path, scenario.device.supply.atmospheric_pressure)
+    return VariedPath(path, quantity, atmosphere, is_gauge, given if is_plain and fits(given, quantity.unit) else "")
 
 
 def value_at(path: str, scenario: Scenario) -> float | None:
@@ -107,32 +124,6 @@ def value_at(path: str, scenario: Scenario) -> float | None:
         return float(of_clock[path]) if path in of_clock else number_at(scenario, path)
     except (AttributeError, KeyError, TypeError):
         return None
-
-
-def given_in(varied: VariedPath, texts: Iterable[object]) -> VariedPath:
-    """Set the display unit of a path to the first unit found in ``texts``.
-
-    A unit in which the number needs a power of ten, such as 1.451e-5 m^3, is not used for display.
-    """
-    number, unit = next((split_quantity(str(text)) for text in texts if unit_in(text)), (0.0, ""))
-    is_plain = number == 0.0 or _SMALLEST_SHOWN <= abs(number) < _LARGEST_SHOWN
-    return replace(varied, given=unit) if is_plain and fits(unit, varied.quantity.unit) else varied
-
-
-def in_its_unit(varied: VariedPath, texts: Iterable[object]) -> VariedPath:
-    """Mark a path as gauge if the atmosphere varies and ``texts`` are gauge pressures such as ``50 psi_g``.
-
-    Gauge pressures are then relative to the atmosphere of each run. Raises UnitError for a mix of gauge and absolute
-    pressures.
-    """
-    units = [split_quantity(text)[1] for text in texts if isinstance(text, str)]
-    gauge = [bool(gauge_link(varied.path, 0.0, unit)) for unit in units]
-    if varied.quantity.unit != "Pa_a" or not any(gauge):
-        return varied
-    if not all(gauge):
-        other = units[gauge.index(not gauge[0])]
-        raise UnitError(f"the atmosphere varies, so '{units[0]}' and '{other}' cannot be mixed")
-    return replace(varied, is_gauge=True)
 
 
 def texts_of(entry: Mapping[str, Any]) -> list[object]:

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import columns_of
-from ppafo.studies.sampling import uniform_numbers
+from ppafo.studies.draws import Uncertainty, uniform_numbers
 from ppafo.studies.study import Configuration, Study, with_followers
 
 MAXIMUM_RUNS_OF_CHUNK = 65_536
@@ -102,7 +101,7 @@ def drawn_values(study: Study, runs: NDArray[np.int64]) -> dict[str, Floats]:
             uniform = np.concatenate(
                 [uniform_numbers(study.sample, dimensions, int(part[0]), part.size) for part in parts]
             )
-        columns |= columns_of(study.drawn, study.scores, uniform)
+        columns |= Uncertainty(study.drawn, study.scores).columns(uniform)
     return {path: columns[path] for path in study.paths}
 
 

@@ -16,7 +16,7 @@ import shutil
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import CodeType, FunctionType
 from typing import TYPE_CHECKING, Any
@@ -69,7 +69,6 @@ _PLAIN = "-"
 """Unit of a dimensionless column."""
 OSCILLATES, FOLLOWS, ON_PURPOSE = "oscillates", "follows", "beyond_reach_on_purpose"
 """Names of the columns of flags: the loop of the run oscillates; the run follows its reference."""
-_TEXT_COLUMNS = ("configuration", "status", "reason", "channel")
 ASKED_ABOVE = 10_000_000_000
 """Size [bytes] above which a study only starts with ``--yes``."""
 _FIXED_BYTES_OF_ROW, _BYTES_OF_NUMBER, _BYTES_OF_SAMPLE, _BYTES_OF_FILE = 3, 8, 4, 12_000
@@ -157,9 +156,13 @@ def _plain(value: Any, enclosing: tuple[int, ...]) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class StudyFolder:
-    """Folder of a study's results; file names are relative to ``path``, with ``/`` between folders."""
+    """Folder of a study's results; file names are relative to ``path``, with ``/`` between folders.
+
+    ``sound`` are the names of tables that were found as they had been written.
+    """
 
     path: Path
+    sound: set[str] = field(default_factory=set, compare=False, repr=False)
 
     def names(self) -> frozenset[str]:
         """Return the names of all files but temporary ones; DataError if the path is a file."""
@@ -187,44 +190,37 @@ class StudyFolder:
         """Write the file of a chunk, then the note that marks it as finished, with the number of its failed runs."""
         self.write(chunk_file(number), content)
         note = {"failed": failed, "file": hashlib.sha256(content).hexdigest()}
-        self.write_document(_note_file(number), note)
+        self.write_document(_note_of(chunk_file(number)), note)
 
     def finished(self, chunks: Sequence[Chunk]) -> dict[int, int]:
         """Return the number of failed runs of each chunk that is there, by chunk number."""
-        names, found = self.names(), {}
-        for number in (chunk.number for chunk in chunks if _note_file(chunk.number) in names):
+        found = dict[int, int]()
+        for number in (chunk.number for chunk in chunks):
             with contextlib.suppress(OSError, ValueError):
-                note = self.document(_note_file(number))
-                with (self.path / chunk_file(number)).open("rb") as file:
-                    if hashlib.file_digest(file, "sha256").hexdigest() == note["file"]:
-                        found[number] = note["failed"]
+                note = self.document(_note_of(chunk_file(number)))
+                self._check(chunk_file(number), note["file"])
+                found[number] = note["failed"]
         return found
 
-    def tables(self, numbers: Sequence[int], columns: Sequence[str] | None = None) -> "Iterator[pa.Table]":
-        """Yield the tables of chunks by number; DataError for a missing or damaged chunk."""
-        return (self.table(chunk_file(number), columns) for number in numbers)
+    def table(self, name: str, columns: Sequence[str] | None = None, digest: str | None = None) -> "pa.Table":
+        """Return a table of the study, or some of its columns; DataError if missing or damaged.
 
-    def table(self, name: str, columns: Sequence[str] | None = None) -> "pa.Table":
-        """Return a table of the study, or some of its columns; DataError if missing, damaged, or of other types."""
-        import pyarrow as pa
-
+        ``digest`` is the SHA-256 of its file, by default that of the note of a chunk.
+        """
         try:
-            table = read_parquet((self.path / name).open("rb"), name, columns)
-            for column in table.schema:
-                kind, is_fit = column.type, pa.types.is_floating(column.type) or pa.types.is_integer(column.type)
-                if column.name.endswith(OVER_TIME):
-                    # As many samples in each row, or they are no matrix.
-                    is_fit = pa.types.is_list(kind) and pa.types.is_floating(kind.value_type)
-                    lengths = table.column(column.name).combine_chunks().value_lengths() if is_fit else ()
-                    is_fit = is_fit and len(set(np.asarray(lengths).tolist())) <= 1
-                elif column.name in _TEXT_COLUMNS:
-                    is_fit = pa.types.is_string(kind) or pa.types.is_dictionary(kind)
-                if not is_fit:
-                    raise DataError(f"column '{column.name}' has the type {kind}")
-        except (DataError, OSError) as error:
+            if name not in self.sound:
+                self._check(name, digest or self.document(_note_of(name))["file"])
+            return read_parquet((self.path / name).open("rb"), name, columns)
+        except (DataError, OSError, ValueError) as error:
             said = f"{self.path}/{name}: is missing or damaged; run the study again into this folder to recompute it"
             raise DataError(said) from error
-        return table
+
+    def _check(self, name: str, digest: str) -> None:
+        """Raise OSError or ValueError unless a file is there and has a SHA-256."""
+        with (self.path / name).open("rb") as file:
+            if hashlib.file_digest(file, _HASH).hexdigest() != digest:
+                raise ValueError("does not have the content that was written")
+        self.sound.add(name)
 
 
 def study_folder(path: str | Path) -> StudyFolder:
@@ -239,8 +235,8 @@ def chunk_file(number: int) -> str:
     return f"runs/chunk-{number:07d}.parquet"
 
 
-def _note_file(number: int) -> str:
-    return f"finished/chunk-{number:07d}.json"
+def _note_of(chunk: str) -> str:
+    return f"finished/{Path(chunk).stem}.json"
 
 
 def hash_of(document: Mapping[str, Any]) -> str:
@@ -322,7 +318,12 @@ def claim(
             f"{folder.path}: is not empty and contains no study results (it has no {MANIFEST}); choose another folder"
         )
     else:
-        _check_room(study, folder, agreed)
+        needed, free = estimate_bytes(study), free_bytes(folder.path)
+        size = f"{folder.path}: {study.runs:,} runs of '{study.name}' need about {needed / 1e6:,.3g} MB"
+        if needed > free:
+            raise StudyError(f"{size}, but only {free / 1e6:,.3g} MB are free: use fewer runs, metrics or trajectories")
+        if needed > ASKED_ABOVE and not agreed:
+            raise StudyError(f"{size}; give {argument_text('agreed', option='--yes')} to start the study")
         report(Progress("preparing", 0, study.runs))
         # A few runs of each configuration, spread evenly: a path that cannot vary is refused at once.
         total = study.runs_of_configuration
@@ -363,16 +364,6 @@ def estimate_bytes(study: Study) -> int:
 def free_bytes(path: Path) -> int:
     """Return the free disk space [bytes] for a folder that may not exist yet."""
     return shutil.disk_usage(next(each for each in (path, *path.parents) if each.exists())).free
-
-
-def _check_room(study: Study, folder: StudyFolder, agreed: bool) -> None:
-    """Raise StudyError for a study that does not fit onto the disk, or is very large without ``--yes``."""
-    needed, free = estimate_bytes(study), free_bytes(folder.path)
-    size = f"{folder.path}: {study.runs:,} runs of '{study.name}' need about {needed / 1e6:,.3g} MB"
-    if needed > free:
-        raise StudyError(f"{size}, but only {free / 1e6:,.3g} MB are free: use fewer runs, metrics or trajectories")
-    if needed > ASKED_ABOVE and not agreed:
-        raise StudyError(f"{size}; give {argument_text('agreed', option='--yes')} to start the study")
 
 
 def compute_chunk(

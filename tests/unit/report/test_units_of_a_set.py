@@ -12,7 +12,7 @@ from ppafo.parameters.parameter_set import written_units
 from ppafo.running import gains
 from ppafo.simulation.gains import remark_on_following_gains
 from ppafo.studies.loading import load_study
-from ppafo.studies.varying import given_in, varied_path
+from ppafo.studies.varying import varied_path
 from ppafo.units.shown import shown_in, shown_text
 from ppafo.walking import load_walk
 
@@ -136,8 +136,7 @@ def test_a_number_is_written_in_the_units_of_the_set_with_digits_that_people_rea
 
 @pytest.mark.parametrize(("text", "shown"), [("1.451e-5 m^3", "14.51 cm^3"), ("14510 mm^3", "14510 mm^3")])
 def test_a_unit_that_needs_a_power_of_ten_is_not_the_one_in_which_a_number_is_said(text: str, shown: str) -> None:
-    varied = varied_path("actuator.torque_constant", ppafo.load_scenario(TASK))
-    assert given_in(varied, [text]).quote(1.451e-5) == shown
+    assert varied_path("actuator.torque_constant", ppafo.load_scenario(TASK), [text]).quote(1.451e-5) == shown
 
 
 def test_every_table_of_an_analysis_is_in_the_units_of_the_set(in_bar: str, tmp_path: Path) -> None:

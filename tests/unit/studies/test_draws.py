@@ -8,10 +8,10 @@ import pytest
 
 from ppafo.errors import StudyError
 from ppafo.simulation.loading import load_scenario
-from ppafo.studies.draws import choose_configuration, drawn_in, uncertainty_in, uncertainty_of
+from ppafo.studies.draws import uncertainty_of
 from ppafo.studies.intervals import effective_sample_size, fraction_interval, replicates_interval
 from ppafo.studies.limits import MetricLimit, check_metrics
-from ppafo.studies.loading import load_study
+from ppafo.studies.loading import drawn_in, load_study
 
 
 def study(**changes: Any) -> dict[str, Any]:
@@ -58,8 +58,7 @@ def test_draws_have_the_distributions_and_the_correlation_of_the_study() -> None
 def test_what_varies_in_one_configuration_only_keeps_the_correlation_among_the_rest() -> None:
     document = study()
     document["vary"][0]["only"] = ["solenoid"]
-    whole = load_study(document)
-    uncertainty = uncertainty_in(whole, choose_configuration(whole, "proportional"))
+    _, _, uncertainty = drawn_in(document, (), "proportional")
     assert uncertainty.paths == ("valve.area", "actuator.leak.area")
     columns = uncertainty.random_columns(0, 20_000, 1)
     found = np.corrcoef(columns["valve.area"], columns["actuator.leak.area"])[0, 1]
@@ -71,9 +70,9 @@ def test_what_varies_in_one_configuration_only_keeps_the_correlation_among_the_r
 def test_a_choice_of_configurations_is_not_made_in_silence() -> None:
     whole = load_study(study())
     with pytest.raises(StudyError, match="has several configurations; choose one: proportional, solenoid"):
-        choose_configuration(whole, None)
+        drawn_in(whole, (), None)
     with pytest.raises(StudyError, match="no configuration 'solenoids', did you mean 'solenoid'"):
-        choose_configuration(whole, "solenoids")
+        drawn_in(whole, (), "solenoids")
 
 
 def test_a_grid_has_no_probability() -> None:

@@ -10,10 +10,9 @@ import pytest
 import ppafo
 from ppafo.analyses.compare import compare
 from ppafo.simulation.numbers import NOISE_SEED
-from ppafo.studies.draws import uncertainty_of
+from ppafo.studies.draws import other_noise, uncertainty_of
 from ppafo.studies.intervals import noise_interval
 from ppafo.studies.loading import load_study
-from ppafo.studies.sampling import other_noise
 from ppafo.study.blocks import drawn_values
 
 NOISY = ["run.duration=0.3 s", "sensors.pressure_noise=5 kPa_d"]

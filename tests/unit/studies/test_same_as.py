@@ -11,8 +11,7 @@ from ppafo.errors import StudyError
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import with_numbers
-from ppafo.studies.draws import uncertainty_in
-from ppafo.studies.loading import load_study
+from ppafo.studies.loading import drawn_in, load_study
 from ppafo.study.blocks import drawn_values, varied_columns
 
 STUDY: dict[str, Any] = {
@@ -55,8 +54,7 @@ def test_a_study_with_such_a_path_is_swept() -> None:
 
 
 def test_path_follows_in_the_draws_of_analyses_too() -> None:
-    loaded = load_study(STUDY)
-    uncertainty = uncertainty_in(loaded, loaded.configurations[0])
+    _, _, uncertainty = drawn_in(STUDY, (), None)
     assert uncertainty.paths == ("actuator.dead_volume_1",)
     columns = uncertainty.random_columns(0, 5, 1)
     assert np.array_equal(columns["actuator.dead_volume_2"], columns["actuator.dead_volume_1"])

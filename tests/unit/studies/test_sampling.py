@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ppafo.studies.distributions import Distribution
+from ppafo.studies.draws import cholesky_factor, permute, uniform_numbers
 from ppafo.studies.loading import load_study
-from ppafo.studies.sampling import cholesky_factor, permute, uniform_numbers
 from ppafo.studies.study import SamplingPlan
 from ppafo.study.blocks import drawn_values
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from ppafo.studies.draws import study_of
+from ppafo.studies.loading import study_of
 from ppafo.study.blocks import chunks_of
 
 

@@ -90,7 +90,7 @@ def sensitivity(
     """
     name_plugins(plugins)
     from ppafo.analyses.sensitivity.methods import DEFAULT_SAMPLES, METHODS, analyse, finding_of
-    from ppafo.studies.draws import drawn_in
+    from ppafo.studies.loading import drawn_in
     from ppafo.study.executing import executor_of
     from ppafo.study.runs import RunCounter, scenario_runs
 
