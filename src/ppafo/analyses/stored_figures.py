@@ -9,7 +9,7 @@ from ppafo.errors import DataError
 from ppafo.report.recording_figure import recording_figure
 from ppafo.report.stored_figure import draw_stored_walk, read_result, stated_units
 from ppafo.rig.experiments import RIG_FILE
-from ppafo.storage.owned_folder import MARK, entries_of, marking_command, read_json
+from ppafo.storage.owned_folder import MARK, entries_of, read_json
 from ppafo.storage.reading import read_recording
 from ppafo.storage.result_folder import MANIFEST, NETCDF_FILE, RUN_FILE
 from ppafo.units.shown import shown_in
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _FIGURE = "figure"
-_NAMED = 6
 
 
 def names_in(folder: Path) -> list[str]:
@@ -60,20 +59,3 @@ def _document(file: Path) -> dict[str, Any]:
     if not isinstance(document, dict):
         raise DataError(f"{file}: must be a JSON object")
     return document
-
-
-def what_is_there(folder: Path, names: list[str]) -> tuple[str, dict[str, Any]]:
-    """Describe the figures and the main file of a result folder: a sentence, and plain data.
-
-    Raises DataError for any other folder.
-    """
-    if MARK not in names:
-        raise DataError(f"{folder}: is not a result folder of ppafo; give a folder written by a ppafo command")
-    command = marking_command(folder)
-    pictures = [name for name in names if name.endswith(".png")]
-    page = next((name for name in names if name.endswith(".html")), None)
-    named = ", ".join(pictures[:_NAMED]) + (", ..." if len(pictures) > _NAMED else "")
-    has = f"has its figures ({named})" if pictures else "has no figures"
-    opened = page or next((name for name in names if name.endswith(".txt")), MARK)
-    sentence = f"{folder}: the result of 'ppafo {command}' {has}; open {folder / opened}"
-    return sentence, {"files": [], "command": command, "figures": pictures, "open": str(folder / opened)}

@@ -25,7 +25,6 @@ from ppafo.metrics import METRICS
 from ppafo.report.finding import Finding, Section, columns_of, facts
 from ppafo.report.kind import TIME, YES_OR_NO, Kind, of_path, of_stored_metric
 from ppafo.report.panels import Mark, Panel
-from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION, font_size
 from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.numbers import NOISE_SEED
@@ -65,21 +64,25 @@ COLOURS = (BLUE, VERMILION, GREEN, ORANGE, GREY)
 """Colours of the configurations in a figure, which has no more of them than that."""
 MOST_METRICS, MOST_COMPARED = 4, 2
 """Largest number of metrics in a figure, and with a panel for each configuration: more would be too low to read."""
-MAXIMUM_DRAWN, _MAXIMUM_POINTS = 4_000_000, 3000
-"""Largest number of runs in a figure, spread evenly over all, and in a curve or in the points of a panel."""
+_MAXIMUM_POINTS = 3000
+"""Largest number of runs in a curve, or in the points of a panel."""
 _COLUMNS, _PANEL, _COMPARED_PANEL = 2, (2.9, 2.4), (2.7, 2.3)
 """Panels side by side in a figure; size of a panel [inches], and of one in a row that compares configurations."""
 _HISTOGRAM_BINS = 60
 """Largest number of bins in the histogram of a metric."""
 _OPACITIES = (0.18, 0.32, 0.45)
 """Opacities of the bands of one channel, from the outermost to the innermost."""
-_NAMED = 3
-"""Largest number of varied values named in the title of a figure."""
 _CAPTION = (
     "Distributions of the metrics, their dependence on the varied values, and quantiles over time where requested."
 )
 _ENOUGH = 0.5
 """Smallest fraction of a configuration's runs that must complete: with fewer, the median is that of the failed runs."""
+_FLAGS = {
+    "oscillating": "the loop oscillates (column 'oscillates')",
+    "not_following": "the reference is not followed (column 'follows')",
+    "without_verdict": "it is not known whether the reference is followed (column 'follows' is empty)",
+}
+"""Counts of the summary that are said, in words."""
 Columns = dict[str, np.ndarray[Any, Any]]
 
 
@@ -177,17 +180,11 @@ class StudyResults:
         stored = list(dict.fromkeys([*outputs.get("trajectories", ()), *outputs.get("bands", ())]))
         if channel not in stored:
             raise StudyError(f"the study stores no trajectories of '{channel}'{known_names(channel, stored)}")
-        return self._matrix(channel)
+        return self.matrix(channel)
 
     def bands(self) -> Columns:
         """Return quantile bands over time as columns: configuration, channel, time, and a column for each quantile."""
         return as_numpy(self.folder.table(BANDS, digest=self.summary.get(BANDS)))
-
-    def thin(self, column: str, maximum: int) -> Columns:
-        """Return a column by name of the configuration, thinned to every n-th run for about ``maximum`` runs in all."""
-        # An odd step: an even one would see one half of a grid whose last axis has two values.
-        step = -(-int(self.document["runs"]) // maximum) | 1
-        return {name: values[::step] for name, values in self.by_configuration(column).items()}
 
     def known(self, configuration: str, column: str) -> Floats:
         """Return the finite values of a column of the runs of a configuration."""
@@ -203,7 +200,8 @@ class StudyResults:
             numbers = numbers[of_each * self.configurations.index(configuration) :][:of_each]
         return (self.folder.table(chunk_file(number), columns) for number in numbers)
 
-    def _matrix(self, channel: str, configuration: str | None = None, samples: slice = slice(None)) -> Floats:
+    def matrix(self, channel: str, configuration: str | None = None, samples: slice = slice(None)) -> Floats:
+        """Return samples of a stored channel (runs, samples), of one configuration or of all."""
         column = trace_column(channel)
         parts = self.chunks([column], configuration)
         return np.concatenate([matrix_of(part.column(column))[:, samples] for part in parts])
@@ -245,17 +243,18 @@ def summarise(study: Study, results: StudyResults) -> StudyResults:
 
     The summary has numbers of runs, first failed runs, and statistics of each metric.
     """
-    completed, failures = dict.fromkeys(results.configurations, 0), list[dict[str, Any]]()
-    for name in completed:
+    names, failures = results.configurations, list[dict[str, Any]]()
+    completed, known = dict.fromkeys(names, 0), results.known
+    for name in names:
         for part in results.chunks(["run", "configuration", "status", "reason"], name):
             rows = np.asarray(part.column("status").to_numpy() == STATUSES[0])
             completed[name] += int(np.count_nonzero(rows))
             if len(failures) < _EXAMPLES and not rows.all():
                 failures += part.filter(~rows).slice(0, _EXAMPLES - len(failures)).to_pylist()
     # A run that diverged has a time at which it did; one that was refused never began.
-    failed = study.runs - sum(completed.values())
-    diverged = sum(results.known(name, "failure_time").size for name in completed)
-    follow = {name: results.known(name, FOLLOWS) for name in completed}
+    failed, diverged = study.runs - sum(completed.values()), sum(known(name, "failure_time").size for name in names)
+    follow = {name: known(name, FOLLOWS) for name in names}
+    missed = {name: np.count_nonzero(follow[name] == 0.0) - np.count_nonzero(known(name, ON_PURPOSE)) for name in names}
     summary: dict[str, Any] = {
         "study": study.name,
         **({"overrides": list(study.changes)} if study.changes else {}),
@@ -264,11 +263,8 @@ def summarise(study: Study, results: StudyResults) -> StudyResults:
         "diverged": diverged,
         "refused": failed - diverged,
         "completed_by_configuration": completed,
-        "oscillating": {name: int(np.count_nonzero(results.known(name, OSCILLATES))) for name in completed},
-        "not_following": {
-            name: int(np.count_nonzero(own == 0.0) - np.count_nonzero(results.known(name, ON_PURPOSE)))
-            for name, own in follow.items()
-        },
+        "oscillating": {name: int(np.count_nonzero(known(name, OSCILLATES))) for name in names},
+        "not_following": {name: int(count) for name, count in missed.items()},
         "without_verdict": {
             each.name: completed[each.name] - follow[each.name].size
             for each in study.configurations
@@ -278,10 +274,10 @@ def summarise(study: Study, results: StudyResults) -> StudyResults:
         "configurations": {
             name: {
                 metric: {"unit": METRICS[metric].unit, "summary": METRICS[metric].summary}
-                | describe(results.known(name, metric), study.outputs.quantiles)
+                | describe(known(name, metric), study.outputs.quantiles)
                 for metric in study.outputs.metrics
             }
-            for name in completed
+            for name in names
         },
     }
     if study.outputs.bands:
@@ -324,30 +320,27 @@ def _bands_file(study: Study, results: StudyResults) -> bytes:
     for number, configuration in enumerate(study.configurations):
         samples = samples_of(study, configuration)
         for row, channel in enumerate(outputs.bands):
-            counts, levels = [], []
             for start in range(0, samples, at_once):
-                values = results._matrix(channel, configuration.name, slice(start, start + at_once))
-                counts.append(np.count_nonzero(np.isfinite(values), axis=0))
-                levels.append(sorted_quantiles(np.sort(values, axis=0), counts[-1], outputs.quantiles))
-            quantiles = zip(outputs.quantiles, np.concatenate(levels, axis=1), strict=True)
-            parts.append(
-                {
-                    "configuration": np.full(samples, number),
-                    "channel": np.full(samples, row),
-                    "time": outputs.every * np.arange(samples),
-                    "runs": np.concatenate(counts),
-                    **{f"q{fraction:g}": level for fraction, level in quantiles},
-                }
-            )
+                values = results.matrix(channel, configuration.name, slice(start, start + at_once))
+                counts = np.count_nonzero(np.isfinite(values), axis=0)
+                levels = sorted_quantiles(np.sort(values, axis=0), counts, outputs.quantiles)
+                places = {"configuration": np.full(counts.size, number), "channel": np.full(counts.size, row)}
+                times = {"time": outputs.every * np.arange(start, start + counts.size), "runs": counts}
+                parts.append(
+                    {**places, **times, **dict(zip(map("q{:g}".format, outputs.quantiles), levels, strict=True))}
+                )
     rows, units = joined(parts), {stored_unit(CHANNELS[name].unit) for name in outputs.bands}
     unit = units.pop() if len(units) == 1 else "SI unit of the channel"
-    names = encode_texts(rows.pop("configuration"), results.configurations)
+    rows["configuration"] = encode_texts(rows["configuration"], results.configurations)
+    rows["channel"] = encode_texts(rows["channel"], outputs.bands)
+    said = {
+        "configuration": ("-", "name of the base scenario"),
+        "channel": ("-", "name of the channel"),
+        "time": ("s", "time since the start"),
+        "runs": ("-", "completed runs, without a fall so far"),
+    }
     columns = {
-        "configuration": TableColumn(names, "-", "name of the base scenario"),
-        "channel": TableColumn(encode_texts(rows.pop("channel"), outputs.bands), "-", "name of the channel"),
-        "time": TableColumn(rows.pop("time"), "s", "time since the start"),
-        "runs": TableColumn(rows.pop("runs"), "-", "completed runs, without a fall so far"),
-        **{name: TableColumn(values, unit, "quantile over runs") for name, values in rows.items()},
+        name: TableColumn(values, *said.get(name, (unit, "quantile over runs"))) for name, values in rows.items()
     }
     return parquet_bytes(table_of(columns, {"study": study.name}))
 
@@ -368,35 +361,21 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
     ended = ", ".join(f"{summary[key]:,} {key}" for key in STATUSES if summary[key])
     said = [f"{results.name}: {document['runs']:,} runs: {ended}"]
     failures = [f"run {each['run']} ({each['configuration']}): {each['reason']}" for each in summary["failures"]]
-    if summary["failures"]:
-        first, failed = summary["failures"][0], document["runs"] - summary["completed"]
-        said.append(
-            f"{failed:,} of {document['runs']:,} runs failed and have no metrics; the first is run {first['run']}: "
-            f"{first['reason']}"
-        )
-    # Where some runs have a verdict, 0 is news too.
-    flags = (
-        ("oscillating", "the loop oscillates (column 'oscillates')"),
-        ("not_following", "the reference is not followed (column 'follows')"),
-        ("without_verdict", "it is not known whether the reference is followed (column 'follows' is empty)"),
-    )
-    for key, words in flags:
+    for first in summary["failures"][:1]:
+        failed = f"{document['runs'] - summary['completed']:,} of {document['runs']:,} runs failed and have no metrics"
+        said.append(f"{failed}; the first is run {first['run']}: {first['reason']}")
+    for key, words in _FLAGS.items():
         for name, whole in completed.items():
+            # Where some runs have a verdict, 0 is news too.
             is_news = key == "not_following" and summary["without_verdict"].get(name, whole) < whole
             if (count := summary[key].get(name, 0)) or is_news:
                 said.append(f"{name}: in {count:,} of {whole:,} runs ({100.0 * count / max(whole, 1):.3g} %) {words}")
     useless = [name for name, count in completed.items() if count < _ENOUGH * runs]
     said += [f"{name}: most runs failed: the statistics of the others do not describe the study" for name in useless]
-    rows = [
-        (
-            number["path"],
-            number["kind"],
-            ", ".join(
-                f"{key.replace('_', ' ')} {value}" for key, value in number.items() if key not in ("path", "kind")
-            ),
-        )
-        for number in study.get("vary", ())
-    ]
+    rows = []
+    for number in study.get("vary", ()):
+        keys = (f"{key.replace('_', ' ')} {value}" for key, value in number.items() if key not in ("path", "kind"))
+        rows.append((number["path"], number["kind"], ", ".join(keys)))
     sampling = [
         f"Correlation of {pair['between'][0]} with {pair['between'][1]}: {pair['coefficient']}, of their normal scores."
         for pair in study.get("correlations", ())
@@ -416,7 +395,7 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
         title=results.name,
         said=said,
         parts=(
-            _figure(results, [" ".join(study["description"].split())] if study.get("description") else [], failures),
+            replace(_figure(results), remarks=failures),
             *(_metrics(results, name) for name in results.configurations),
             Section("What varied" if rows else "", columns_of(("path", "kind", ""), rows), left=3, is_detail=True),
             Section(said=sampling, is_detail=True),
@@ -439,48 +418,46 @@ def _metrics(results: StudyResults, name: str) -> Section:
     described = [each for own in results.metrics.values() for each in own.values() if each["count"]]
     fractions = list(described[0]["quantiles"]) if described else []
     head = ("metric", "unit", "runs", "mean", "sd", *(f"{100 * float(fraction):g} %" for fraction in fractions))
-    rows = []
+    kinds, rows = _kinds(results), []
     for metric, own in results.metrics[name].items():
-        kind = _kind(results, metric)
-        cells = [metric, kind.shown_unit, f"{own['count']:,}"]
+        kind, cells = kinds[metric], [""] * (len(head) - 3)
         if own["count"]:
             deviation = kind.change_number(own["sd"]) if "sd" in own else ""
-            cells += [kind.number(own["mean"]), deviation, *map(kind.number, own["quantiles"].values())]
-        rows.append([*cells, *[""] * (len(head) - len(cells))])
+            cells = [kind.number(own["mean"]), deviation, *map(kind.number, own["quantiles"].values())]
+        rows.append([metric, kind.shown_unit, f"{own['count']:,}", *cells])
     completed = f"{name}: {results.summary['completed_by_configuration'][name]:,} runs completed"
     return Section(columns=columns_of(head, rows), said=[completed], left=2)
 
 
-def _kind(results: StudyResults, name: str) -> Kind:
-    """Return the kind of a metric or varied path from its stored unit, also for a metric that no longer exists."""
-    if name == FOLLOWS:
+def _kinds(results: StudyResults) -> dict[str, Kind]:
+    """Return the kinds of varied paths and metrics from their stored units, also of a metric that no longer exists."""
+    varied, metrics = results.document["varied"].items(), results.document["metrics"].items()
+    return {
         # A column of every study, not a requested metric.
-        return Kind(f"Follows its reference{YES_OR_NO}")
-    if name in results.document["metrics"]:
-        return of_stored_metric(name, results.document["metrics"][name]["unit"])
-    varied = results.document["varied"][name]
-    return of_path(name, varied["unit"].removeprefix("-"), given=varied["given"])
+        FOLLOWS: Kind(f"Follows its reference{YES_OR_NO}"),
+        **{path: of_path(path, each["unit"].removeprefix("-"), given=each["given"]) for path, each in varied},
+        **{name: of_stored_metric(name, each["unit"]) for name, each in metrics},
+    }
 
 
-def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) -> Section:
+def _figure(results: StudyResults) -> Section:
     """Return the figure of a study: panels of the metrics, and bands over time.
 
     A grid of two axes is drawn as maps, two drawn values as coloured points, all else as one panel for each metric.
     """
-    study, names = results.document["study"], results.configurations[: len(COLOURS)]
-    # A metric that no run has would be a hole in the figure, unless no metric has a value.
-    with_values = [
-        metric
+    study, names, kinds = results.document["study"], results.configurations[: len(COLOURS)], _kinds(results)
+    described = {
+        metric: [own[metric] for own in results.metrics.values() if own[metric]["count"]]
         for metric in results.document["metrics"]
-        if any(own[metric]["count"] for own in results.metrics.values())
-    ]
+    }
+    # A metric that no run has would be a hole in the figure, unless no metric has a value.
+    with_values = [metric for metric, rows in described.items() if rows]
     chosen: dict[str, str] = {}
     for metric in with_values:
-        rows = [own[metric] for own in results.metrics.values() if own[metric]["count"]]
         # A metric with the same displayed digits in all runs, or equal to another, shows no difference.
-        if len({_kind(results, metric).text(row[end]) for row in rows for end in ("minimum", "maximum")}) > 1:
-            chosen.setdefault(str(rows), metric)
-    differing = list(chosen.values()) or with_values[:1] or list(results.document["metrics"])
+        if len({kinds[metric].text(row[end]) for row in described[metric] for end in ("minimum", "maximum")}) > 1:
+            chosen.setdefault(str(described[metric]), metric)
+    differing = list(chosen.values()) or with_values[:1] or list(described)
     # The value of a seed has no meaning.
     varied = [path for path in results.varied if path != NOISE_SEED]
     grid = [number["path"] for number in study.get("vary", ()) if number["kind"] in ("grid", "list")]
@@ -495,19 +472,12 @@ def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) 
     constant = ", ".join(metric for metric in with_values if metric not in differing)
     # A map of the verdict, if some runs follow their reference and others do not.
     if is_mapped:
-        verdicts = np.concatenate(list(results.thin(FOLLOWS, MAXIMUM_DRAWN).values()))
-        metrics += [FOLLOWS] if {0.0, 1.0} <= set(verdicts.tolist()) else []
+        metrics += [FOLLOWS] if {0.0, 1.0} <= set(results.table([FOLLOWS])[FOLLOWS].tolist()) else []
     title = f"{results.name}, {results.summary['completed']:,} runs"
-    if not is_mapped and len(varied) > 1:
-        labels = [label_of(path) for path in varied[:_NAMED]]
-        # Within the sentence a label is in lower case, but for abbreviations.
-        labels = [label if label[:2].isupper() else label[:1].lower() + label[1:] for label in labels]
-        more = f" and {len(varied) - _NAMED} more" if len(varied) > _NAMED else ""
-        title += f" over {len(varied)} values: {', '.join(labels)}{more}"
+    title += f" over {len(varied)} values" * (not is_mapped and len(varied) > 1)
     count = len(metrics) + len(study["outputs"].get("bands", ()))
     return Section(
-        said=said,
-        remarks=remarks,
+        said=[" ".join(study["description"].split())] if study.get("description") else [],
         panels=partial(_panels, results, metrics, names, varied, grid),
         name="figure",
         caption=_CAPTION
@@ -524,32 +494,41 @@ def _panels(
     results: StudyResults, metrics: Sequence[str], names: Sequence[str], varied: Sequence[str], grid: Sequence[str]
 ) -> list[Panel]:
     """Return a panel for each metric and each band; over two paths, a panel of a metric for each configuration."""
-    if 2 in (len(grid), len(varied)):
-        over_two = partial(_map, results, grid) if len(grid) == 2 else partial(_points, results, varied)
-        panels = [over_two(metric, name, name if len(names) > 1 else "") for metric in metrics for name in names]
-    elif len(varied) == 1:
-        across, panels = results.thin(varied[0], MAXIMUM_DRAWN), []
-        for metric in metrics:
-            values, marks = results.thin(metric, MAXIMUM_DRAWN), []
+    kinds, panels = _kinds(results), list[Panel]()
+    for metric in metrics:
+        kind, values = kinds[metric], results.by_configuration(metric)
+        if len(grid) == 2:
+            panels += [_map(results, grid, values[name], name, kinds, kind) for name in names]
+        elif len(varied) == 2:
+            for name in names:
+                # An odd step: an even one would see one half of a grid whose last axis has two values.
+                step = -(-values[name].size // _MAXIMUM_POINTS) | 1
+                x, y = (results.by_configuration(path)[name][::step] for path in varied)
+                dots = Mark("points", x, y, kind.values(values[name][::step]))
+                panels.append(Panel(kinds[varied[0]], kinds[varied[1]], [dots], scale=kind))
+        elif len(varied) == 1:
+            across, marks = results.by_configuration(varied[0]), []
             for name, colour in zip(results.configurations, COLOURS, strict=False):
                 # Draws come in any order, a line goes from left to right.
                 order = np.argsort(across[name], kind="stable")
                 order = order[:: max(1, order.size // _MAXIMUM_POINTS)]
                 x, y = across[name][order], values[name][order]
                 marks.append(Mark("line", x, y, label=name, colour=colour, style={"marker": "."}))
-            panels.append(Panel(_kind(results, varied[0]), _kind(results, metric), marks))
-    else:
-        panels = [_histogram(results, metric) for metric in metrics]
+            panels.append(Panel(kinds[varied[0]], kind, marks))
+        else:
+            panels.append(_histogram(values, kind))
+    if 2 in (len(grid), len(varied)) and len(names) > 1:
+        panels = [replace(panel, title=names[number % len(names)]) for number, panel in enumerate(panels)]
     panels += [_band(results, channel) for channel in results.document["study"]["outputs"].get("bands", ())]
     # The first panel with curves names the configurations for all.
     with_names = next((panel for panel in panels if len(names) > 1 and any(mark.label for mark in panel.marks)), None)
     return [replace(panel, legend="inside" if panel is with_names else "") for panel in panels]
 
 
-def _histogram(results: StudyResults, metric: str) -> Panel:
+def _histogram(by_name: Columns, kind: Kind) -> Panel:
     """Return a panel with the histogram of a metric for every configuration."""
-    by_name = {name: values[np.isfinite(values)] for name, values in results.thin(metric, MAXIMUM_DRAWN).items()}
-    values, kind = np.concatenate(list(by_name.values())), _kind(results, metric)
+    known = {name: values[np.isfinite(values)] for name, values in by_name.items()}
+    values = np.concatenate(list(known.values()))
     if not values.size:
         return Panel(kind, Kind(), (), then=methodcaller("set", yticks=[]))
     low, high, ticks = float(values.min()), float(values.max()), {}
@@ -563,52 +542,41 @@ def _histogram(results: StudyResults, metric: str) -> Panel:
         edges = np.linspace(low, high, 1 + min(_HISTOGRAM_BINS, max(8, round(values.size**0.5))))
     marks = [
         Mark("bars", edges, np.histogram(own, edges)[0], label=name, colour=colour)
-        for (name, own), colour in zip(by_name.items(), COLOURS, strict=False)
+        for (name, own), colour in zip(known.items(), COLOURS, strict=False)
     ]
     return Panel(kind, Kind(), marks, then=methodcaller("set", yticks=[], **ticks))
 
 
-def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, title: str) -> Panel:
+def _map(
+    results: StudyResults, grid: Sequence[str], values: Floats, name: str, kinds: Mapping[str, Kind], kind: Kind
+) -> Panel:
     """Return a map of the mean of a metric over two paths for one configuration; white if no run completed."""
     (columns, column), (rows, row) = (
-        np.unique(results.thin(path, MAXIMUM_DRAWN)[name], return_inverse=True) for path in grid
+        np.unique(results.by_configuration(path)[name], return_inverse=True) for path in grid
     )
     # A point of the grid may have several draws, some of which failed: the mean of the others.
-    values = results.thin(metric, MAXIMUM_DRAWN)[name]
     cell, known, cells = row * columns.size + column, np.isfinite(values), rows.size * columns.size
     count, total = (np.bincount(cell[known], weights, minlength=cells) for weights in (None, values[known]))
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(rows.size, columns.size)
-    kind, kinds = _kind(results, metric), [_kind(results, path) for path in grid]
     declared = {number["path"]: number for number in results.document["study"]["vary"]}
-    # Values of a list are drawn side by side, in cells of equal size, with their values at the ticks.
-    are_listed = [declared[path]["kind"] == "list" for path in grid]
-    places = [
-        np.arange(float(levels.size)) if is_listed else levels
-        for levels, is_listed in zip((columns, rows), are_listed, strict=True)
-    ]
+    axis_kinds, places, settings = list[Kind](), list[Floats](), dict[str, Any]()
+    for side, path, levels in zip("xy", grid, (columns, rows), strict=True):
+        axis_kinds.append(kinds[path])
+        places.append(levels)
+        if declared[path]["kind"] == "list":
+            # Drawn side by side, in cells of equal size, with their values at the ticks.
+            axis_kinds[-1], places[-1] = Kind(kinds[path].axis), np.arange(float(levels.size))
+            labels = [f"{value:g}" for value in kinds[path].values(levels)]
+            settings |= {f"{side}ticks": places[-1], f"{side}ticklabels": labels}
+        elif declared[path].get("spacing") == "logarithmic":
+            settings[f"{side}scale"] = "log"
 
     def mark_axes(axes: "Axes") -> None:
-        """Set ticks for the values of a list, and logarithmic scales."""
         axes.grid(visible=False)
-        sides = ((axes.xaxis, axes.set_xscale, columns), (axes.yaxis, axes.set_yscale, rows))
-        for number, (axis, set_scale, levels) in enumerate(sides):
-            if are_listed[number]:
-                axis.set_ticks(places[number], [f"{value:g}" for value in kinds[number].values(levels)])
-            elif declared[grid[number]].get("spacing") == "logarithmic":
-                set_scale("log")
+        axes.set(**settings)
 
-    across, upward = (Kind(each.axis) if is_listed else each for each, is_listed in zip(kinds, are_listed, strict=True))
-    return Panel(
-        across, upward, (Mark("map", places[0], places[1], kind.values(mean)),), title, scale=kind, then=mark_axes
-    )
-
-
-def _points(results: StudyResults, paths: Sequence[str], metric: str, name: str, title: str) -> Panel:
-    """Return a panel of points over two drawn values, coloured by a metric, for one configuration."""
-    most, kind = _MAXIMUM_POINTS * len(results.configurations), _kind(results, metric)
-    x, y, values = (results.thin(path, most)[name] for path in (*paths, metric))
-    across, upward = (_kind(results, path) for path in paths)
-    return Panel(across, upward, (Mark("points", x, y, kind.values(values)),), title, scale=kind)
+    marks = [Mark("map", places[0], places[1], kind.values(mean))]
+    return Panel(axis_kinds[0], axis_kinds[1], marks, scale=kind, then=mark_axes)
 
 
 def _band(results: StudyResults, channel: str) -> Panel:

@@ -2,12 +2,14 @@
 
 import sys
 from pathlib import Path
-from typing import Any
 
 from ppafo.arguments import FigureWidth, File, Folder
 from ppafo.cli import output
 from ppafo.cli.output import CommandOutput
 from ppafo.errors import DataError
+
+_NAMED = 6
+"""Number of figures that are named."""
 
 
 def export_figure(folder: Folder, *, out: File | None = None, width: FigureWidth | None = None) -> CommandOutput:
@@ -32,7 +34,7 @@ def export_figure(folder: Folder, *, out: File | None = None, width: FigureWidth
             allowed = ", ".join(f".{name}" for name in FIGURE_FORMATS)
             raise DataError(f"--out {out}: the name must end in one of {allowed}")
         output.check_new_file(out)
-    from ppafo.analyses.stored_figures import draw_folder, names_in, what_is_there
+    from ppafo.analyses.stored_figures import draw_folder, names_in
     from ppafo.report.drawing import load_drawing
 
     names = names_in(folder)
@@ -44,7 +46,7 @@ def export_figure(folder: Folder, *, out: File | None = None, width: FigureWidth
     with drawn_at(width):
         figures = draw_folder(folder, names)
     if not figures:
-        return _figures_to_open(*what_is_there(folder, names), out, width)
+        return _figures_to_open(folder, names, out, width)
     if out is None:
         files = {
             f"{stem}.{file_format}": content
@@ -65,16 +67,26 @@ def export_figure(folder: Folder, *, out: File | None = None, width: FigureWidth
     return CommandOutput(f"written: {', '.join(written)}", {"files": written})
 
 
-def _figures_to_open(message: str, document: dict[str, Any], out: Path | None, width: float | None) -> CommandOutput:
+def _figures_to_open(folder: Path, names: list[str], out: Path | None, width: float | None) -> CommandOutput:
     """List the figures of a result that cannot be drawn again. Raises DataError if a file or a width is requested."""
-    command, stems = document["command"], [name.removesuffix(".png") for name in document["figures"]]
+    from ppafo.storage.owned_folder import MARK, marking_command
+
+    if MARK not in names:
+        raise DataError(f"{folder}: is not a result folder of ppafo; give a folder written by a ppafo command")
+    command, pictures = marking_command(folder), [name for name in names if name.endswith(".png")]
     remedy = ""
     # Not every command is a function of the package.
-    if stems and hasattr(sys.modules["ppafo"], command):
-        call = f"ppafo.{command}(...).plot({stems[0]!r}, width='84 mm').savefig('{stems[0]}.pdf')"
+    if pictures and hasattr(sys.modules["ppafo"], command):
+        stem = pictures[0].removesuffix(".png")
+        call = f"ppafo.{command}(...).plot({stem!r}, width='84 mm').savefig('{stem}.pdf')"
         remedy = f"; for another format or width, use Python with the arguments of the command: {call}"
     if out is None and width is None:
-        return CommandOutput(f"{message}{remedy}", document)
+        named = ", ".join(pictures[:_NAMED]) + (", ..." if len(pictures) > _NAMED else "")
+        has = f"has its figures ({named})" if pictures else "has no figures"
+        pages = (name for ending in (".html", ".txt") for name in names if name.endswith(ending))
+        opened = str(folder / next(pages, MARK))
+        document = {"files": [], "command": command, "figures": pictures, "open": opened}
+        return CommandOutput(f"{folder}: the result of 'ppafo {command}' {has}; open {opened}{remedy}", document)
     option = f"--width {1e3 * width:g} mm" if out is None and width is not None else f"--out {out}"
     raise DataError(
         f"{option}: figures of 'ppafo {command}' cannot be drawn again, only figures of runs, walks, studies "

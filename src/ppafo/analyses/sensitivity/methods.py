@@ -25,9 +25,7 @@ from ppafo.report.kind import Kind, of_metric
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import COLOURS, GREY, MARKERS
-from ppafo.simulation.gains import remark_on_following_gains
 from ppafo.simulation.numbers import NOISE_SEED
-from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import Uncertainty, replicate_seed
 from ppafo.studies.intervals import jackknife_reach
@@ -56,10 +54,6 @@ _MAXIMUM_LINES = 5
 _MOST_SIZES = 3
 """Largest number of sample sizes with a tick, whose labels would run together if there were more."""
 _TITLES = {"total": "total", "first": "first order", "shapley": "Shapley effect"}
-_CAPTION = (
-    "Left: indices with confidence bands, {filled} filled{open}. Right: convergence of the largest indices with the "
-    "sample size, in the colours and markers of the left panel.{settings}"
-)
 SCRAMBLES = 8
 """Number of independent scrambles of the Sobol sequence, to which base points are assigned in turn."""
 _INNER = 3
@@ -300,11 +294,6 @@ class MetricSensitivity:
         """Sensitivity indices of the metric from all blocks."""
         return self.settling[-1]
 
-    @property
-    def dropped_blocks(self) -> int:
-        """Number of blocks left out because of a failed run."""
-        return self.indices.blocks - self.indices.used
-
 
 @dataclass(frozen=True, slots=True)
 class Influences:
@@ -320,7 +309,6 @@ class Influences:
     ``gains``: remarks on controller gains that follow the uncertain values or are kept from another kind; or empty
     """
 
-    study: str
     method: str
     noun: str
     samples: int
@@ -333,6 +321,7 @@ class Influences:
     not_following: int
     metrics: list[MetricSensitivity]
     constant: dict[str, float]
+    study: str = ""
     gains: tuple[str, ...] = ()
 
 
@@ -342,19 +331,12 @@ def analyse(
     uncertainty: Uncertainty,
     method: Method,
     samples: int,
-    *,
+    metrics: Sequence[str],
     seed: int = 1,
     confidence: float = 0.95,
     maximum_failed: float = 0.02,
-    study: str = "",
-    scenario: Scenario | None = None,
-    metrics: Sequence[str],
 ) -> Influences:
-    """Return the sensitivity indices of metrics.
-
-    ``scenario`` is the scenario of the runs, None for a model.
-    Raises StudyError for invalid settings, dependent values or too many failures.
-    """
+    """Return the sensitivity indices of metrics; StudyError for settings that cannot be used or too many failures."""
     if uncertainty.scores is not None and method is SOBOL:
         raise StudyError(
             f"sensitivity: {method.name} assumes independent values, but the study has [[correlations]]; use "
@@ -368,18 +350,52 @@ def analyse(
     columns = uncertainty.columns(method.design(uncertainty, samples, seed))
     rows = runs.run(columns)
     runs.check(rows, maximum_failed, "sensitivity", metrics)
-    values = {name: rows[name] for name in metrics}
-    constant = {name: float(np.nanmin(each)) for name, each in values.items() if np.nanmin(each) == np.nanmax(each)}
-    if len(constant) == len(values):
+    constant = {
+        name: float(np.nanmin(rows[name])) for name in metrics if np.nanmin(rows[name]) == np.nanmax(rows[name])
+    }
+    if len(constant) == len(metrics):
         said = ", ".join(f"'{name}' is {number:g}" for name, number in constant.items())
         raise StudyError(f"sensitivity: {said} in every run, so no value influences it; choose another metric")
-    inputs = []
-    for number in uncertainty.drawn:
-        # A seed has no order: from its 5 to its 95 % quantile nothing changes.
-        ends = number.distribution.values(np.array(_ENDS)) * (np.nan if number.path == NOISE_SEED else 1.0)
-        inputs.append((columns[number.path].reshape(samples, -1), ends))
+    found = list[MetricSensitivity]()
+    for name in (name for name in metrics if name not in constant):
+        table = rows[name].reshape(samples, -1)
+        # The formulas need whole blocks: one run without a value takes its block with it.
+        known, settling = np.isfinite(table), list[Indices]()
+        whole = np.flatnonzero(known.all(axis=1))
+        # All blocks, and halves, and halves of halves, as far as they say something: many of the first may be left out,
+        # and a metric that counts may be the same in all.
+        halved = {samples >> halvings for halvings in range(_SIZES)}
+        for size in sorted({size for size in halved if size >= _FEWEST} | {samples}):
+            first = whole[whole < size]
+            if first.size >= _FEWEST_WHOLE and float(np.ptp(table[first])) > 0.0:
+                estimated = method.indices(table[first], first, len(uncertainty.drawn), seed, confidence)
+                settling.append(Indices(*estimated, size, first.size))
+        if not settling or settling[-1].blocks != samples:
+            raise StudyError(
+                f"sensitivity: only {whole.size:,} of {samples:,} {method.noun} "
+                f"have '{name}' in all their runs; use more samples, or correct the runs that fail"
+            )
+        values = table[whole].ravel()
+        part = np.repeat(np.unique(whole % SCRAMBLES, return_inverse=True)[1], table.shape[1])
+        changes = []
+        for number in uncertainty.drawn:
+            # A seed has no order: from its 5 to its 95 % quantile nothing changes.
+            ends = number.distribution.values(np.array(_ENDS)) * (np.nan if number.path == NOISE_SEED else 1.0)
+            inputs = columns[number.path].reshape(samples, -1)[whole].ravel()
+            # About the mean, because the sums of the lines below cancel.
+            changes.append(_change(values - np.mean(values), inputs, ends, part, confidence))
+        found.append(
+            MetricSensitivity(
+                metric=name,
+                mean=float(np.mean(table[known])),
+                standard_deviation=float(np.std(table[known], ddof=1)),
+                runs_without_value=int(np.count_nonzero(~known)),
+                change_from_5_to_95_percent=[change for change, _ in changes],
+                band_of_change=[band for _, band in changes],
+                settling=settling,
+            )
+        )
     return Influences(
-        study=study,
         method=method.name,
         noun=method.noun,
         samples=samples,
@@ -390,104 +406,52 @@ def analyse(
         runs=runs.count,
         failed=runs.failures,
         not_following=int(np.count_nonzero(rows["off"])),
-        metrics=[
-            _metric_sensitivity(name, each.reshape(samples, -1), inputs, method, seed, confidence)
-            for name, each in values.items()
-            if name not in constant
-        ],
+        metrics=found,
         constant=constant,
-        gains=()
-        if scenario is None
-        else (remark_on_following_gains(scenario, uncertainty.paths), scenario.origin.replaced),
     )
 
 
-def _metric_sensitivity(
-    name: str,
-    table: Floats,
-    inputs: Sequence[tuple[Floats, Floats]],
-    method: Method,
-    seed: int,
-    confidence: float,
-) -> MetricSensitivity:
-    """Return the sensitivity of a metric with values (blocks, rows of a block), for growing parts of the sample.
-
-    ``inputs`` are the values of each path, of the same shape, and its 5 and 95 % quantile. Raises StudyError if too few
-    blocks are complete.
-    """
-    known, samples, settling = np.isfinite(table), len(table), list[Indices]()
-    # The formulas need whole blocks: one run without a value takes its block with it.
-    whole = np.flatnonzero(known.all(axis=1))
-    # All blocks, and halves, and halves of halves, as far as they say something: many of the first may be left out, and
-    # a metric that counts may be the same in all.
-    halved = {samples >> halvings for halvings in range(_SIZES)}
-    for size in sorted({size for size in halved if size >= _FEWEST} | {samples}):
-        first = whole[whole < size]
-        if first.size >= _FEWEST_WHOLE and float(np.ptp(table[first])) > 0.0:
-            estimated = method.indices(table[first], first, len(inputs), seed, confidence)
-            settling.append(Indices(*estimated, size, first.size))
-    if not settling or settling[-1].blocks != samples:
-        raise StudyError(
-            f"sensitivity: only {whole.size:,} of {samples:,} {method.noun} "
-            f"have '{name}' in all their runs; use more samples, or correct the runs that fail"
-        )
-    values = table[whole].ravel()
-    # About the mean, because the sums of the lines below cancel.
-    values, part = values - np.mean(values), np.unique(whole % SCRAMBLES, return_inverse=True)[1]
-    part = np.repeat(part, table.shape[1])
-    changes = [_change(values, column[whole].ravel(), ends, part, confidence) for column, ends in inputs]
-    return MetricSensitivity(
-        metric=name,
-        mean=float(np.mean(table[known])),
-        standard_deviation=float(np.std(table[known], ddof=1)),
-        runs_without_value=int(np.count_nonzero(~known)),
-        change_from_5_to_95_percent=[change for change, _ in changes],
-        band_of_change=[band for _, band in changes],
-        settling=settling,
-    )
-
-
-def finding_of(influences: Influences) -> Finding[Influences]:
+def finding_of(found: Influences) -> Finding[Influences]:
     """Return the sensitivity indices as a finding, with a table and two panels for each metric."""
-    shown = list(influences.metrics[0].indices.values)
+    first, *others = (_TITLES[name] for name in found.metrics[0].indices.values)
     sentences = [
-        f"{influences.study}: {influences.method}, {influences.samples:,} {influences.noun}, {influences.runs:,} "
-        f"runs of {len(influences.paths)} uncertain values; bands with {100.0 * influences.confidence:g} % confidence",
-        f"{influences.failed:,} runs failed; up to {100.0 * influences.maximum_failed:g} % are allowed, and every "
-        f"{influences.noun[:-1]} with a failed run is left out",
+        f"{found.study}: {found.method}, {found.samples:,} {found.noun}, {found.runs:,} "
+        f"runs of {len(found.paths)} uncertain values; bands with {100.0 * found.confidence:g} % confidence",
+        f"{found.failed:,} runs failed; up to {100.0 * found.maximum_failed:g} % are allowed, and every "
+        f"{found.noun[:-1]} with a failed run is left out",
     ]
-    if influences.not_following:
+    if found.not_following:
         sentences.append(
-            f"in {influences.not_following:,} runs the reference is not followed; the indices include these runs"
+            f"in {found.not_following:,} runs the reference is not followed; the indices include these runs"
         )
-    for name, number in influences.constant.items():
+    for name, number in found.constant.items():
         sentences.append(f"{name} is {of_metric(name).text(number)} in every run: no value influences it")
-    sentences += filter(None, influences.gains)
+    caption = f"Left: indices with confidence bands, {first} filled{''.join(f', {other} open' for other in others)}."
+    caption += " Right: convergence of the largest indices with the sample size, in the colours and markers of the left"
+    caption += " panel."
+    if any(found.gains[:1]):
+        caption += " Settings of the controller are recomputed in every run."
     figure = Section(
         "Indices and their convergence",
-        panels=partial(_panels, influences),
+        panels=partial(_panels, found),
         name="sensitivity",
-        caption=_CAPTION.format(
-            filled=_TITLES[shown[0]],
-            open="".join(f", {_TITLES[name]} open" for name in shown[1:]),
-            settings=" Settings of the controller are recomputed in every run." if any(influences.gains[:1]) else "",
-        ),
+        caption=caption,
         across=2,
-        size=(3.0, max(2.5, 0.9 + _INCHES_OF_A_BAR * len(influences.paths))),
-        title=f"Sensitivity of {influences.study}",
+        size=(3.0, max(2.5, 0.9 + _INCHES_OF_A_BAR * len(found.paths))),
+        title=f"Sensitivity of {found.study}",
         is_detail=True,
     )
     return Finding(
         name="sensitivity",
         kicker="Sensitivity",
-        title=f"Sensitivity of {influences.study}",
-        said=tuple(sentences),
-        parts=(*(_part(influences, metric) for metric in influences.metrics), figure),
-        found=influences,
+        title=f"Sensitivity of {found.study}",
+        said=(*sentences, *filter(None, found.gains)),
+        parts=(*(_part(found, metric) for metric in found.metrics), figure),
+        found=found,
     )
 
 
-def _part(influences: Influences, metric: MetricSensitivity) -> Section:
+def _part(found: Influences, metric: MetricSensitivity) -> Section:
     """Return a table with a row for each uncertain value, the most influential first, with remarks.
 
     The remarks are on neighbours in the ranking whose bands overlap, and on the sum of first-order indices. Values
@@ -496,49 +460,59 @@ def _part(influences: Influences, metric: MetricSensitivity) -> Section:
     """
     kind, indices, remarks = of_metric(metric.metric, "+.3g"), metric.indices, list[str]()
     ranking, reach = indices.ranking, next(iter(indices.bands.values()))
-    order = np.argsort(-ranking)
-    columns = [Column("value", [influences.paths[row] for row in order])]
+    order = np.argsort(-ranking).tolist()
+    columns = [Column("value", [found.paths[row] for row in order])]
     for name, values in indices.values.items():
         columns.append(Column(_TITLES[name], [f"{round(values[row], 3) + 0.0:.3f}" for row in order]))
         columns.append(Column("band", [f"± {indices.bands[name][row]:.3f}" for row in order]))
-    change, band = metric.change_from_5_to_95_percent, metric.band_of_change
-    ends = [None if math.isnan(change[row]) else f"± {kind.change_number(band[row], '.2g')}" for row in order]
-    change_cells = [None if math.isnan(change[row]) else change[row] for row in order]
-    columns += [Column("change, 5 to 95 %", change_cells, kind, is_change=True), Column("band", ends)]
+    changes = [metric.change_from_5_to_95_percent[row] for row in order]
+    ends = [f"± {kind.change_number(metric.band_of_change[row], '.2g')}" for row in order]
+    bands = [None if math.isnan(change) else end for change, end in zip(changes, ends, strict=True)]
+    columns += [Column("change, 5 to 95 %", changes, kind, is_change=True), Column("band", bands)]
     mean = of_metric(metric.metric).number(metric.mean)
     heading = f"{metric.metric}: mean {mean}, sd {kind.change(metric.standard_deviation)}"
-    if metric.dropped_blocks:
-        heading += f"; {metric.dropped_blocks:,} of {influences.samples:,} {influences.noun} left out"
+    if dropped := indices.blocks - indices.used:
+        heading += f"; {dropped:,} of {found.samples:,} {found.noun} left out"
     # In the order of the table, in which only neighbours can be mistaken for each other.
-    counting = order[(ranking + reach)[order] >= _NEGLIGIBLE * np.max(ranking)]
+    counting = [row for row in order if (ranking + reach)[row] >= _NEGLIGIBLE * np.max(ranking)]
     unsettled = [
-        f"{influences.paths[first]} and {influences.paths[second]}"
-        for first, second in pairwise(counting)
-        if ranking[first] - reach[first] < ranking[second] + reach[second]
+        f"{found.paths[one]} and {found.paths[other]}"
+        for one, other in pairwise(counting)
+        if ranking[one] - reach[one] < ranking[other] + reach[other]
     ]
     if unsettled:
         remarks.append(f"not converged at this sample size, confidence bands overlap: {', '.join(unsettled)}")
     if "first" in indices.values:
         alone, error = float(np.sum(indices.values["first"])), float(np.linalg.norm(indices.bands["first"]))
-        interactions = ": interactions, if any, are within this error"
-        if alone + error < 1.0:
-            interactions = "; the rest comes from interactions"
-        remarks.append(f"first-order indices sum to {alone:.3f} ± {error:.2g}{interactions}")
+        rest = "; the rest comes from interactions"
+        rest = rest if alone + error < 1.0 else ": interactions, if any, are within this error"
+        remarks.append(f"first-order indices sum to {alone:.3f} ± {error:.2g}{rest}")
     return Section(heading, columns, remarks=remarks)
 
 
 # A function with a name: a lambda in a report cannot be pickled.
-def _panels(influences: Influences) -> list[Panel]:
+def _panels(found: Influences) -> list[Panel]:
     """Return two panels for each metric: its indices with their bands, and the largest for growing parts of the sample.
 
     A row and a colour are of a value, grey beyond the values of the second panel; a second index has open markers.
     """
+
+    def name_values(axes: "Axes", places: NDArray[np.intp], labels: Sequence[str]) -> None:
+        axes.set_yticks(places, labels)
+        axes.axvline(0.0, color="#9a9a9a", linewidth=0.8)
+
+    def set_sizes(axes: "Axes", sizes: Sequence[int]) -> None:
+        """Make the axis of the sizes logarithmic, with ticks at the largest size and at even steps below."""
+        axes.set_xscale("log", base=2)
+        ticks = sizes[:: -math.ceil(len(sizes) / _MOST_SIZES)]
+        axes.set_xticks(ticks, [str(size) for size in ticks])
+        axes.minorticks_off()
+
     panels = list[Panel]()
-    for metric in influences.metrics:
-        indices = metric.indices
-        order = np.argsort(-indices.ranking)
+    for metric in found.metrics:
+        indices, order, bars, courses = metric.indices, np.argsort(-metric.indices.ranking), list[Mark](), list[Mark]()
         colours = [COLOURS[rank] if rank < _MAXIMUM_LINES else GREY for rank in range(order.size)]
-        places, bars, courses = np.arange(order.size)[::-1], list[Mark](), list[Mark]()
+        places = np.arange(order.size)[::-1]
         for (name, values), filled, shift in zip(indices.values.items(), ("full", "none"), (0.14, -0.14), strict=False):
             for row, colour, place in zip(order, colours, places, strict=True):
                 style = {"markersize": 5, "elinewidth": 1.4, "fillstyle": filled, "fmt": MARKERS.get(colour, "o")}
@@ -547,31 +521,15 @@ def _panels(influences: Influences) -> list[Panel]:
                 at = [values[row]], [place + shift], [indices.bands[name][row]]
                 bars.append(Mark("reach", *at, label, colour, style))
         name, sizes = next(iter(indices.values)), [step.blocks for step in metric.settling]
-        largest = order[:_MAXIMUM_LINES]
-        for row, colour in zip(largest, colours, strict=False):
-            values, bands = (
-                np.array([of_step[name][row] for of_step in steps])
-                for steps in ([step.values for step in metric.settling], [step.bands for step in metric.settling])
-            )
+        settled = np.array([[step.values[name], step.bands[name]] for step in metric.settling])
+        for row, colour in zip(order[:_MAXIMUM_LINES], colours, strict=False):
+            values, bands = settled[:, :, row].T
             line = {"marker": MARKERS.get(colour, "o"), "markersize": 3.5, "linewidth": 1.2}
             courses.append(Mark("line", sizes, values, colour=colour, style=line))
             courses.append(Mark("band", sizes, np.stack([values - bands, values + bands]), colour=colour))
-        labels = [label_of(influences.paths[row]) for row in order]
-        named, words = partial(_name_values, places, labels), of_metric(metric.metric).words
+        named = partial(name_values, places=places, labels=[label_of(found.paths[row]) for row in order])
+        words, title = of_metric(metric.metric).words, f"{_TITLES[name].capitalize()}, {len(courses) // 2} largest"
+        axis = Kind(found.noun.capitalize())
         panels.append(Panel(Kind("Fraction of the variance"), Kind(), bars, words, legend="figure", then=named))
-        title, axis = f"{_TITLES[name].capitalize()}, {largest.size} largest", Kind(influences.noun.capitalize())
-        panels.append(Panel(axis, Kind(), courses, title, then=partial(_set_sizes, sizes)))
+        panels.append(Panel(axis, Kind(), courses, title, then=partial(set_sizes, sizes=sizes)))
     return panels
-
-
-def _name_values(places: NDArray[np.intp], labels: Sequence[str], axes: "Axes") -> None:
-    axes.set_yticks(places, labels)
-    axes.axvline(0.0, color="#9a9a9a", linewidth=0.8)
-
-
-def _set_sizes(sizes: Sequence[int], axes: "Axes") -> None:
-    """Make the axis of the sizes logarithmic, with ticks at the largest size and at even steps below."""
-    axes.set_xscale("log", base=2)
-    ticks = sizes[:: -math.ceil(len(sizes) / _MOST_SIZES)]
-    axes.set_xticks(ticks, [str(size) for size in ticks])
-    axes.minorticks_off()

@@ -90,6 +90,7 @@ def sensitivity(
     """
     name_plugins(plugins)
     from ppafo.analyses.sensitivity.methods import DEFAULT_SAMPLES, METHODS, analyse, finding_of
+    from ppafo.simulation.gains import remark_on_following_gains
     from ppafo.studies.loading import drawn_in
     from ppafo.study.executing import executor_of
     from ppafo.study.runs import RunCounter, scenario_runs
@@ -106,16 +107,8 @@ def sensitivity(
     tally = RunCounter(count * by.block_rows(len(used.drawn)), progress)
     runs = scenario_runs(base.scenario, requested, tally, used.gauge, threads, executor_of(executor))
     with shown_in(chosen.shown_for(base.scenario)):
-        found = analyse(
-            runs,
-            used,
-            by,
-            count,
-            seed=chosen.sample.seed if seed is None else seed,
-            confidence=confidence,
-            maximum_failed=maximum_failed,
-            study=f"{chosen.name}, {base.name}",
-            scenario=base.scenario,
-            metrics=requested,
-        )
-        return replace(finding_of(found), overrides=chosen.changes)
+        seed = chosen.sample.seed if seed is None else seed
+        found = analyse(runs, used, by, count, requested, seed, confidence, maximum_failed)
+        gains = remark_on_following_gains(base.scenario, used.paths), base.scenario.origin.replaced
+        finding = finding_of(replace(found, study=f"{chosen.name}, {base.name}", gains=gains))
+        return replace(finding, overrides=chosen.changes)

@@ -35,13 +35,6 @@ def test_statistics_are_those_of_numpy(name: str) -> None:
         assert said["quantiles"][f"{share:g}"] == pytest.approx(np.quantile(values, share), rel=1e-9)
 
 
-def test_a_thinned_column_has_every_so_many_runs_across_chunks(small_results: StudyResults) -> None:
-    whole = small_results.by_configuration("rms_error")
-    for most, step in ((1000, 1), (11, 3), (7, 5)):
-        for name, values in small_results.thin("rms_error", most).items():
-            np.testing.assert_array_equal(values, whole[name][::step])
-
-
 def test_rows_are_a_data_frame_in_si_or_in_units(small_results: StudyResults) -> None:
     frame, rows = small_results.to_dataframe(), small_results.table()
     assert list(frame) == list(rows)
