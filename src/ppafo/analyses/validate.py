@@ -54,11 +54,6 @@ _UNUSUAL = re.compile(r"[^A-Za-z0-9_.-]+")
 """Pattern of characters that are replaced in file names."""
 _WRITTEN_AS_ZERO = 5.0e-4
 """Absolute value below which a number in the table of errors is written as 0."""
-_OF_CHANNEL = (
-    *("unit", "rms", "noise", "passes", "full_range", "variation"),
-    *("rms_unaligned", "bias", "largest", "largest_time"),
-)
-"""Errors of a channel that its data has under the names of the fields."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,30 +104,30 @@ class Validation:
             },
             "recordings": [
                 {
-                    **fields_of(agreement, "file", "sha256", "motion", "step", "passes"),
+                    **fields_of(agreement.request.measured, "file", "sha256"),
+                    **fields_of(agreement, "delay", "passes"),
                     **fields_of(agreement.measured, "label", "kind", "duration"),
                     "samples": len(agreement.measured),
-                    "inputs": list(agreement.inputs),
-                    "delay": agreement.delay.correction,
-                    "delay_is_at_limit": agreement.delay.is_at_limit,
+                    "motion": agreement.request.settings.motion,
+                    "step": agreement.replayed.step,
+                    "inputs": list(agreement.replayed.inputs),
+                    "delay_is_at_limit": agreement.is_at_limit,
                     "remarks": list(agreement.remarks),
-                    "channels": {channel.channel: _channel_data(channel) for channel in agreement.channels},
+                    "channels": {
+                        channel.channel: {
+                            **fields_of(channel, "unit", "rms", "rms_unaligned", "noise", "passes", "full_range"),
+                            **fields_of(channel, "variation", "bias", "largest", "largest_time"),
+                            "rms_share": channel.fraction,
+                            "limit_share": channel.limit,
+                            "shown": {"unit": (kind := _kind_of(channel)).shown_unit, "rms": kind.shown(channel.rms)},
+                        }
+                        for channel in agreement.channels
+                    },
                 }
                 for agreement in self.recordings
             ],
             "versions": {"ppafo": __version__},
         }
-
-
-def _channel_data(channel: ChannelAgreement) -> dict[str, Any]:
-    """Return the errors of a channel as plain data in SI, and the RMS error in the unit that people are shown."""
-    kind = _kind_of(channel)
-    return {
-        **fields_of(channel, *_OF_CHANNEL),
-        "rms_share": channel.fraction,
-        "limit_share": channel.limit,
-        "shown": {"unit": kind.shown_unit, "rms": kind.shown(channel.rms)},
-    }
 
 
 def _kind_of(channel: ChannelAgreement) -> Kind:
@@ -218,20 +213,20 @@ def validate(
         raise DataError(f"motion '{chosen}': a fixed volume has no moving vane")
     states = parse_initial(initial, device.supply.atmospheric_pressure)
     settings = ReplaySettings(chosen, states, longest_delay, parse_thresholds(thresholds), volume)
-    read, agreements = read_all(recordings, device, columns), []
-    for measured in read:
+    agreements = []
+    for measured in read_all(recordings, device, columns):
         report(Progress(f"replaying {measured.file}"))
         agreements.append(compare_recording(measured, device, settings))
-    causes = causes_of(read, agreements, device, settings, report)
+    causes = causes_of(agreements, report)
     return _finding_of(Validation(str(parameter_set), device, tuple(overrides), settings, tuple(agreements), causes))
 
 
 def verdict(validation: Validation) -> str:
     """Return a sentence on the agreement of the set, with the largest deviation and its probable cause, if any."""
-    causes = validation.causes
-    passes = validation.passes
-    name = validation.device.name
-    pairs = [(channel, agreement) for agreement in validation.recordings for channel in agreement.channels]
+    from ppafo.simulation.recorded.usual_errors import PRESSURE_ERRORS
+
+    causes, passes, recordings = validation.causes, validation.passes, validation.recordings
+    pairs = [(channel, agreement) for agreement in recordings for channel in agreement.channels]
     worst = max((channel for channel, _ in pairs), key=lambda channel: channel.in_noise)
     if causes.is_noise:
         # The search fits the state at the start too, where a joint that moves already has no rest to read it from.
@@ -240,11 +235,16 @@ def verdict(validation: Validation) -> str:
     else:
         share = f"{percentage(worst.fraction, 2)} of full range"
         texts = [f"{worst.channel} is off by {_times(worst.in_noise)} times its noise ({share})"]
-        if not passes and causes.found is None and any(row.motion == "free" for row in validation.recordings):
+        if not passes and causes.found is None and any(row.request.settings.motion == "free" for row in recordings):
             texts.append("the vane was taken to be free")
         texts.append(_why(causes, worst.in_noise, passes))
-    texts.append(_removed_delay(validation))
-    explanation = "; ".join(filter(None, texts))
+    # Said if it is longer than usual of sensors: a valve may be late as well.
+    if (removed := max(agreement.delay for agreement in recordings)) > PRESSURE_ERRORS.delay:
+        said = f"a delay of {1.0e3 * removed:.3g} ms was removed"
+        if (delay := validation.device.valve.settings.get("delay")) is not None:
+            said += f", of the sensors or of the valve (valve.delay = {1.0e3 * (delay + removed):.3g} ms)"
+        texts.append(said)
+    explanation, name = "; ".join(filter(None, texts)), validation.device.name
     if not passes:
         failed = ", ".join(
             f"{channel.channel} in {agreement.file} ({percentage(channel.fraction, 3)}, limit "
@@ -253,11 +253,11 @@ def verdict(validation: Validation) -> str:
             if not channel.passes
         )
         return f"{name} does not agree: {failed}; {explanation}"
-    wide = (
-        f" ({worst.channel}: {percentage(worst.limit, 3)}, which is wider than the noise and may hide a wrong number)"
-    )
-    limit = f"every RMS error is within its limit{'' if causes.is_noise else wide}"
-    return f"{name} agrees with {count_of(len(validation.recordings), 'recording')}: {limit}; {explanation}"
+    agreed = f"{name} agrees with {count_of(len(recordings), 'recording')}: every RMS error is within its limit"
+    if not causes.is_noise:
+        wide = percentage(worst.limit, 3)
+        agreed += f" ({worst.channel}: {wide}, which is wider than the noise and may hide a wrong number)"
+    return f"{agreed}; {explanation}"
 
 
 def _why(causes: Diagnosis, without: float, passes: bool) -> str:
@@ -284,20 +284,6 @@ def _why(causes: Diagnosis, without: float, passes: bool) -> str:
     return f"{said}{f'; tried: {causes.kinds}' if causes.kinds else ''}"
 
 
-def _removed_delay(validation: Validation) -> str:
-    """Return what was removed as common delay, if it is longer than usual of sensors: a valve may be late as well."""
-    from ppafo.simulation.recorded.usual_errors import PRESSURE_ERRORS
-
-    removed = max(agreement.delay.correction for agreement in validation.recordings)
-    if removed <= PRESSURE_ERRORS.delay:
-        return ""
-    delay = validation.device.valve.settings.get("delay")
-    of_valve = (
-        "" if delay is None else f", of the sensors or of the valve (valve.delay = {1.0e3 * (delay + removed):.3g} ms)"
-    )
-    return f"a delay of {1.0e3 * removed:.3g} ms was removed{of_valve}"
-
-
 def _times(size: float) -> str:
     """Return a multiple of the noise as text with two digits and without a power of ten."""
     return f"{size:.2g}" if size < 100.0 else f"{size:.0f}"
@@ -315,10 +301,9 @@ def _finding_of(validation: Validation) -> Finding[Validation]:
         f"{stem}-{1 + stems[:index].count(stem)}" if stems.count(stem) > 1 else stem for index, stem in enumerate(stems)
     ]
     pairs = list(zip(names, validation.recordings, strict=True))
-    kinds = {agreement.measured.kind for agreement in validation.recordings}
-    said, unmeasured = [verdict(validation)], sorted(kinds - {"measured"})
+    kinds, said = {agreement.measured.kind for _, agreement in pairs}, [verdict(validation)]
     # The verdict must not be read without these.
-    if unmeasured:
+    if unmeasured := sorted(kinds - {"measured"}):
         said.append(
             f"Not everything here was measured: {', '.join(KIND_WORDS[kind] for kind in unmeasured)}. Agreement with "
             "such a recording shows how well two models agree, not how well the model agrees with a device."
@@ -329,7 +314,8 @@ def _finding_of(validation: Validation) -> Finding[Validation]:
         "angle between the stops, the gauge pressure of the supply, and twice that for the pressure difference. One "
         "common delay was removed before the errors were computed."
     )
-    hashes = [(recording.file, f"sha256 {recording.sha256}") for recording in validation.recordings if recording.sha256]
+    read = [agreement.request.measured for _, agreement in pairs]
+    hashes = [(measured.file, f"sha256 {measured.sha256}") for measured in read if measured.sha256]
     return Finding(
         name="validate",
         kicker="Validation of a parameter set",
@@ -365,15 +351,14 @@ def _part(name: str, agreement: RecordingAgreement) -> Section:
             for value in (channel.rms, channel.variation, channel.bias, channel.largest)
         )
         shares = [f"{number(100 * share)} %" for share in (channel.fraction, channel.limit)]
-        said = "pass" if channel.passes else "FAIL"
-        at = f"{channel.largest_time:.4g} s"
-        return channel.channel, rms, number(channel.in_noise), variation, *shares, bias, largest, at, said
+        end = bias, largest, f"{channel.largest_time:.4g} s", "pass" if channel.passes else "FAIL"
+        return channel.channel, rms, number(channel.in_noise), variation, *shares, *end
 
     measured, kind = agreement.measured, KIND_WORDS[agreement.measured.kind]
-    delay = f"{1.0e3 * agreement.delay.correction:.3g} ms" if agreement.delay.correction else "none found"
+    delay = f"{1.0e3 * agreement.delay:.3g} ms" if agreement.delay else "none found"
     replayed = (
         f"{len(measured)} samples over {measured.duration:.4g} s; inputs from the recording: "
-        f"{', '.join(agreement.inputs)}; delay of the measurement: {delay}"
+        f"{', '.join(agreement.replayed.inputs)}; delay of the measurement: {delay}"
     )
     across = 1 if len(agreement.channels) == 1 else 2
     return Section(
@@ -402,7 +387,7 @@ def _panels(agreement: RecordingAgreement, across: int) -> list[Panel]:
 
     measured, looks = agreement.measured, {PRESSURE_1: CHAMBER_1, PRESSURE_2: CHAMBER_2}
     time, scale = (Kind("Time", "ms"), 1.0e3) if measured.duration < _SHORT else (TIME, 1.0)
-    rows: list[list[Panel]] = []
+    pairs: list[list[Panel]] = []
     for index, channel in enumerate(agreement.channels):
         name, quantity = channel.channel, COMPARED[channel.channel]
         limit = channel.limit * channel.full_range
@@ -412,20 +397,13 @@ def _panels(agreement: RecordingAgreement, across: int) -> list[Panel]:
             change=Kind(f"Measured - model, RMS {percentage(channel.fraction, 2)}", "", quantity.quantity),
             times=scale * measured.time,
             samples=channel.values,
-            # The measurement is late by the delay, so the model is read that much earlier.
-            model=channel.shift(channel.delay),
+            model=channel.model,
             names=("", "") if index else (KIND_WORDS[measured.kind], "model on the recorded inputs"),
             colour=looks.get(name, ACTUAL).colour,
         )
         is_near = float(np.abs(channel.residuals).max()) >= _NEAR_LIMIT * limit
-        upper, lower = course_panels(curve, "dots", "" if index else "figure", (-limit, limit) if is_near else ())
-        if index % across:
-            rows[-2].append(upper)
-            rows[-1].append(lower)
-        else:
-            rows += [[upper], [lower]]
-    if len(rows[-1]) < across:
-        # An odd number of channels leaves one place in the last row empty.
-        rows[-2].append(Panel(TIME, TIME, ()))
-        rows[-1].append(Panel(TIME, TIME, (), tall=0.5))
-    return [panel for row in rows for panel in row]
+        pairs.append(course_panels(curve, "dots", "" if index else "figure", (-limit, limit) if is_near else ()))
+    # An odd number of channels leaves one place in the last row empty.
+    pairs += [[Panel(TIME, TIME, ()), Panel(TIME, TIME, (), tall=0.5)]] * (-len(pairs) % across)
+    rows = [pairs[first : first + across] for first in range(0, len(pairs), across)]
+    return [panel for row in rows for level in zip(*row, strict=True) for panel in level]

@@ -1,8 +1,8 @@
 """Agreement of the model with a recording, replayed on the recorded inputs: errors channel by channel."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -26,7 +26,6 @@ from ppafo.validation.settings import (
     PRESSURE_1,
     PRESSURE_2,
     PRESSURE_DIFFERENCE,
-    ErrorLimit,
     ReplaySettings,
 )
 from ppafo.wording import argument_text
@@ -43,8 +42,6 @@ _LONGEST_WEIGHT = 3.0
 """Largest weight of one sample, in usual sample intervals [-], so that a gap in time gets no weight."""
 _OTHER_SUPPLY = 0.05
 """Relative difference of recorded and model supply pressure (gauge) [-] from which a remark is made."""
-
-
 _SHIFTS = 81
 """Number of delays on the initial search grid between both limits."""
 _MAXIMUM_SAMPLES = 4000
@@ -61,93 +58,34 @@ _AT_LIMIT = 0.99
 """Fraction of the limit [-] from which a delay counts as being at the limit."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class ChannelAgreement:
-    """Measured and modelled values of one channel, and its residuals (measured - model) in its SI unit.
+    """Errors of the model in one channel, in its SI unit ``unit``.
 
-    ``times`` [s], ``values``: samples, of which the model is shifted by ``delay`` [s]. ``model_times``,
-    ``model_values``: replay. ``unit`` is the SI unit of an error, ``full_range`` the full range of the channel,
-    ``usual_zero`` the usual zero error of a sensor. ``allowed`` is the error limit set by the user, if any.
+    ``values``: samples; ``model``: replay at their times, later by the common delay; ``residuals``: measured - model
+    ``full_range``, ``usual_zero``: full range of the channel, and usual zero error of a sensor
+    ``noise``: standard deviation of the measurement noise, white or correlated
+    ``variation``: standard deviation of the signal without noise, which no model explains
+    ``rms``, ``rms_unaligned``: root mean square of the residuals, and without correction of the delay
+    ``bias``, ``largest``, ``largest_time``: mean, residual of largest magnitude with its sign, and its time [s]
+    ``limit``: largest RMS error that passes, as a fraction of the full range [-]
     """
 
     channel: str
     unit: str
-    times: Floats = field(repr=False)
     values: Floats = field(repr=False)
-    model_times: Floats = field(repr=False)
-    model_values: Floats = field(repr=False)
+    model: Floats = field(repr=False)
+    residuals: Floats = field(repr=False)
     full_range: float
     usual_zero: float
-    allowed: ErrorLimit | None = None
-    delay: float = 0.0
-
-    def shift(self, delay: float) -> Floats:
-        """Return the model delayed by ``delay`` [s] at the sample times, constant outside the range of the model."""
-        return np.interp(self.times - delay, self.model_times, self.model_values)
-
-    @cached_property
-    def residuals(self) -> Floats:
-        """Residuals after correction of the common delay."""
-        return np.asarray(self.values - self.shift(self.delay))
-
-    @cached_property
-    def weights(self) -> Floats:
-        """Weights of the samples, whose sum is 1: the time for which each speaks, by the trapezoidal rule."""
-        intervals = np.diff(self.times)
-        # No sample speaks for a gap.
-        intervals = np.minimum(intervals, _LONGEST_WEIGHT * np.median(intervals))
-        weights = 0.5 * (np.append(intervals, 0.0) + np.insert(intervals, 0, 0.0))
-        return np.asarray(weights / weights.sum())
-
-    @cached_property
-    def noise(self) -> float:
-        """Standard deviation of the measurement noise, white or correlated."""
-        return max(noise_in(self.values, self.full_range), correlated_noise_of(self.residuals))
-
-    @cached_property
-    def variation(self) -> float:
-        """Standard deviation of the signal without noise, which no model explains."""
-        deviation = self.values - self.weights @ self.values
-        return math.sqrt(max(float(self.weights @ deviation**2) - self.noise * self.noise, 0.0))
-
-    @cached_property
-    def rms(self) -> float:
-        """Root mean square of the residuals."""
-        return float(np.sqrt(self.weights @ self.residuals**2))
-
-    @property
-    def rms_unaligned(self) -> float:
-        """Root mean square of the residuals without correction of the delay."""
-        return float(np.sqrt(self.weights @ (self.values - self.shift(0.0)) ** 2))
-
-    @property
-    def bias(self) -> float:
-        """Mean of the residuals."""
-        return float(self.weights @ self.residuals)
-
-    @property
-    def largest(self) -> float:
-        """Residual of largest magnitude, with its sign."""
-        return float(self.residuals[np.argmax(np.abs(self.residuals))])
-
-    @property
-    def largest_time(self) -> float:
-        """Time [s] of the largest residual."""
-        return float(self.times[np.argmax(np.abs(self.residuals))])
-
-    @cached_property
-    def limit(self) -> float:
-        """Largest RMS error that passes, as a fraction of the full range [-].
-
-        Unless the user sets a limit, it is 3 % of full range or half of the signal variance, whichever is less,
-        combined with the noise and with the usual zero error of sensors (the only visible error of a constant signal).
-        """
-        if self.allowed is not None:
-            return self.allowed.fraction_of(self.full_range)
-        explained = min(ACCEPTABLE_FRACTION * self.full_range, math.sqrt(1.0 - EXPLAINED_FRACTION) * self.variation)
-        # Of a low supply the usual zero is much of the range: there the limit stays a fraction of it.
-        zero = min(max(self.usual_zero, _UNMOVED * self.full_range), ACCEPTABLE_FRACTION * self.full_range)
-        return math.hypot(explained, zero, _WITHIN_NOISE * self.noise) / self.full_range
+    noise: float
+    variation: float
+    rms: float
+    rms_unaligned: float
+    bias: float
+    largest: float
+    largest_time: float
+    limit: float
 
     @property
     def fraction(self) -> float:
@@ -166,66 +104,42 @@ class ChannelAgreement:
 
 
 @dataclass(frozen=True, slots=True)
-class Delay:
-    """Delay of the measurement behind the model [s], below 0 if it leads, 0 if undetectable; flag of the limit."""
-
-    value: float
-    is_at_limit: bool
-
-    @property
-    def correction(self) -> float:
-        """Delay to correct [s]; 0 at the search limit and below 0, where the best fit is no delay of a sensor."""
-        return 0.0 if self.is_at_limit else max(self.value, 0.0)
-
-
-def estimate_delay(curves: list[ChannelAgreement], limit: float) -> Delay:
-    """Return the delay within +-``limit`` [s] with the least mean squared error over all channels."""
-    if limit <= 0.0 or not curves:
-        return Delay(0.0, is_at_limit=False)
-    # No more measured samples than the search needs.
-    steps = [-(-curve.times.size // _MAXIMUM_SAMPLES) for curve in curves]
-    thinned = [
-        replace(curve, times=curve.times[::step], values=curve.values[::step])
-        for curve, step in zip(curves, steps, strict=True)
-    ]
-
-    def cost(delay: float) -> float:
-        """Return the mean squared error over all samples and channels, in units of full range squared [-]."""
-        errors = [(curve.shift(delay) - curve.values) / curve.full_range for curve in thinned]
-        return sum(float(np.square(error).mean()) for error in errors) / len(errors)
-
-    shifts = np.linspace(-limit, limit, _SHIFTS).tolist()
-    best = int(np.argmin([cost(shift) for shift in shifts]))
-    bounds = shifts[max(0, best - 1)], shifts[min(_SHIFTS - 1, best + 1)]
-    value = float(minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": _ACCURACY * limit}).x)
-    # A delay counts where it explains more than noise and the accuracy of the engine could.
-    least = cost(value)
-    gain, samples = cost(0.0) - least, sum(curve.times.size for curve in thinned)
-    is_significant = gain > _SMALLEST_GAIN and gain * samples > _MINIMUM_GAIN * least
-    if abs(value) < _RESOLUTION * float(np.median(np.diff(curves[0].times))) or not is_significant:
-        return Delay(0.0, is_at_limit=False)
-    return Delay(value, abs(value) > _AT_LIMIT * limit)
-
-
-@dataclass(frozen=True, slots=True)
 class RecordingAgreement:
-    """Recording, model replayed on the recorded inputs, and residuals of each channel.
+    """Recording, model replayed on the recorded inputs, and errors of each channel.
 
-    ``file`` and ``sha256`` identify the file; ``inputs`` are the recorded channels that drive the model, ``step`` is
-    the time step of the engine [s], ``delay`` the common delay of the measurement, ``remarks`` are sentences for the
-    report.
+    ``request``: recording, device, start and settings of the replay
+    ``replayed``: model on the clock of the recording, with its time step and inputs
+    ``lag``: common delay of the measurement behind the model [s], below 0 if it leads, 0 if undetectable
+    ``is_at_limit``: True if the lag is at the limit of its search
+    ``remarks``: sentences for the report
     """
 
-    file: str
-    sha256: str
-    measured: Recording
-    model: Recording
-    motion: str
-    inputs: tuple[str, ...]
-    step: float
-    delay: Delay
+    request: Replay
+    replayed: Replayed
+    lag: float
+    is_at_limit: bool
     channels: tuple[ChannelAgreement, ...]
     remarks: tuple[str, ...]
+
+    @property
+    def file(self) -> str:
+        """Name of the recording's file."""
+        return self.request.measured.file
+
+    @property
+    def measured(self) -> Recording:
+        """Recording that was compared."""
+        return self.request.measured.recording
+
+    @property
+    def model(self) -> Recording:
+        """Model on the recorded inputs, at its own times."""
+        return self.replayed.recording
+
+    @property
+    def delay(self) -> float:
+        """Common delay that was removed [s]; 0 at the limit and for a lead, where the best fit is no sensor's delay."""
+        return 0.0 if self.is_at_limit else max(self.lag, 0.0)
 
     @property
     def passes(self) -> bool:
@@ -261,66 +175,116 @@ def compare_recording(measured: MeasuredRecording, device: Device, settings: Rep
 
 
 def agreement_of(request: Replay, replayed: Replayed, known_delay: float | None = None) -> RecordingAgreement:
-    """Return the comparison of a recording with its replay; a ``known_delay`` [s] takes the place of the estimate."""
-    measured, longest_delay = request.measured, request.settings.longest_delay
-    curves = _curves(request, replayed)
+    """Return the comparison of a recording with its replay; a ``known_delay`` [s] takes the place of the estimate.
+
+    Raises DataError if no channel can be compared.
+    """
+    measured, device, settings, model = request.measured, request.device, request.settings, replayed.recording
+    recorded, longest = measured.recording, settings.longest_delay
+    read = {name: recorded[name] for name in recorded.names}
+    if PRESSURE_1 in recorded and PRESSURE_2 in recorded:
+        read[PRESSURE_DIFFERENCE] = recorded[PRESSURE_1] - recorded[PRESSURE_2]
+    # Where the vane is locked, or where there is none, some channels carry no information.
+    of_volume, is_locked = settings.volume is not None, settings.motion == "locked"
+    informative = [PRESSURE_1] if of_volume else [name for name in COMPARED if not is_locked or name != ANGLE]
+    samples = {name: read[name] for name in informative if name in read and name not in replayed.inputs}
+    if not samples:
+        needed = "pressure_1" if of_volume else "a channel other than the prescribed angle"
+        raise DataError(f"{measured.file}: no channel can be compared; the recording needs {needed}")
+    gauge = supply_gauge(recorded, device)
+    full_ranges = {name: COMPARED[name].full_range(device, gauge) for name in samples}
     # Sums and multiples of two others do not count twice.
-    sensed = [curve for curve in curves if curve.channel in (ANGLE, PRESSURE_1, PRESSURE_2)]
-    delay = Delay(known_delay or 0.0, is_at_limit=False)
-    if known_delay is None:
-        delay = estimate_delay(sensed or curves[:1], longest_delay)
-    remarks = [*measured.remarks, *_remarks(measured, request.device, request.settings)]
-    if delay.is_at_limit:
-        remarks.append(f"model and measurement differ in time by more than {longest_delay:g} s; no delay was removed")
-    elif delay.value < 0.0:
+    sensed = [name for name in (ANGLE, PRESSURE_1, PRESSURE_2) if name in samples] or list(samples)[:1]
+    lag, is_at_limit = known_delay or 0.0, False
+    if known_delay is None and longest > 0.0:
+        curves = [(samples[name], model[name], full_ranges[name]) for name in sensed]
+        lag, is_at_limit = _estimated_delay(recorded.time, model.time, curves, longest)
+    remarks = [*measured.remarks, *_remarks(measured, device, settings)]
+    if is_at_limit:
+        remarks.append(f"model and measurement differ in time by more than {longest:g} s; no delay was removed")
+    elif lag < 0.0:
         remarks.append(
-            f"the recorded signals lead the model by {1.0e3 * -delay.value:.3g} ms; sensors lag, so this was not "
-            "removed"
+            f"the recorded signals lead the model by {1.0e3 * -lag:.3g} ms; sensors lag, so this was not removed"
         )
-    return RecordingAgreement(
-        file=measured.file,
-        sha256=measured.sha256,
-        measured=measured.recording,
-        model=replayed.recording,
-        motion=request.settings.motion,
-        inputs=replayed.inputs,
-        step=replayed.step,
-        delay=delay,
-        channels=tuple(replace(curve, delay=delay.correction) for curve in curves),
-        remarks=tuple(remarks),
+    agreement = RecordingAgreement(request, replayed, lag, is_at_limit, channels=(), remarks=tuple(remarks))
+    channels = [_channel(agreement, name, values, full_ranges[name]) for name, values in samples.items()]
+    return replace(agreement, channels=tuple(channels))
+
+
+def _channel(agreement: RecordingAgreement, name: str, values: Floats, full_range: float) -> ChannelAgreement:
+    """Return the errors of the model in a channel with a full range [SI], of which the ``values`` were recorded.
+
+    Unless the user sets a limit, it is 3 % of full range or half of the signal variance, whichever is less, combined
+    with the noise and with the usual zero error of sensors (the only visible error of a constant signal).
+    """
+    times, replay, request = agreement.measured.time, agreement.model, agreement.request
+    intervals = np.diff(times)
+    # Each sample speaks for its time, by the trapezoidal rule, and none for a gap.
+    intervals = np.minimum(intervals, _LONGEST_WEIGHT * np.median(intervals))
+    weights = 0.5 * (np.append(intervals, 0.0) + np.insert(intervals, 0, 0.0))
+    weights = weights / weights.sum()
+    model, unaligned = (np.interp(times - delay, replay.time, replay[name]) for delay in (agreement.delay, 0.0))
+    residuals = values - model
+    noise = max(noise_in(values, full_range), correlated_noise_of(residuals))
+    deviation = values - weights @ values
+    variation = math.sqrt(max(float(weights @ deviation**2) - noise * noise, 0.0))
+    worst = int(np.argmax(np.abs(residuals)))
+    usual_zero, thresholds = COMPARED[name].usual_zero(request.device), request.settings.thresholds
+    if (allowed := thresholds.get(name, thresholds.get(""))) is not None:
+        limit = allowed.value if allowed.is_fraction else allowed.value / full_range
+    else:
+        explained = min(ACCEPTABLE_FRACTION * full_range, math.sqrt(1.0 - EXPLAINED_FRACTION) * variation)
+        # Of a low supply the usual zero is much of the range: there the limit stays a fraction of it.
+        zero = min(max(usual_zero, _UNMOVED * full_range), ACCEPTABLE_FRACTION * full_range)
+        limit = math.hypot(explained, zero, _WITHIN_NOISE * noise) / full_range
+    return ChannelAgreement(
+        channel=name,
+        unit=COMPARED[name].unit,
+        values=values,
+        model=model,
+        residuals=residuals,
+        full_range=full_range,
+        usual_zero=usual_zero,
+        noise=noise,
+        variation=variation,
+        rms=float(np.sqrt(weights @ residuals**2)),
+        rms_unaligned=float(np.sqrt(weights @ (values - unaligned) ** 2)),
+        bias=float(weights @ residuals),
+        largest=float(residuals[worst]),
+        largest_time=float(times[worst]),
+        limit=limit,
     )
 
 
-def _curves(request: Replay, replayed: Replayed) -> list[ChannelAgreement]:
-    """Return measured and modelled curves of the recorded channels, without inputs. Raises DataError if none remain."""
-    recorded, device, settings = request.measured.recording, request.device, request.settings
-    gauge = supply_gauge(recorded, device)
-    # Where the vane is locked, or where there is none, some channels carry no information.
-    informative = {name for name in COMPARED if settings.motion != "locked" or name != ANGLE}
-    if settings.volume is not None:
-        informative = {PRESSURE_1}
-    curves, model = [], replayed.recording
-    for name, channel in COMPARED.items():
-        is_of_both = name == PRESSURE_DIFFERENCE and PRESSURE_1 in recorded and PRESSURE_2 in recorded
-        if name in informative and name not in replayed.inputs and (is_of_both or name in recorded):
-            values = recorded[PRESSURE_1] - recorded[PRESSURE_2] if is_of_both else recorded[name]
-            curves.append(
-                ChannelAgreement(
-                    channel=name,
-                    unit=channel.unit,
-                    times=recorded.time,
-                    values=values,
-                    model_times=model.time,
-                    model_values=model[name],
-                    full_range=channel.full_range(device, gauge),
-                    usual_zero=channel.usual_zero(device),
-                    allowed=settings.thresholds.get(name, settings.thresholds.get("")),
-                )
-            )
-    if not curves:
-        needed = "pressure_1" if settings.volume is not None else "a channel other than the prescribed angle"
-        raise DataError(f"{request.measured.file}: no channel can be compared; the recording needs {needed}")
-    return curves
+def _estimated_delay(
+    times: Floats, model_times: Floats, curves: Sequence[tuple[Floats, Floats, float]], limit: float
+) -> tuple[float, bool]:
+    """Return the delay within +-``limit`` [s] with the least mean squared error, and True if it is at the limit.
+
+    ``curves`` are samples at ``times``, model at ``model_times`` and full range of each channel.
+    """
+    # No more measured samples than the search needs.
+    thinned = slice(None, None, -(-times.size // _MAXIMUM_SAMPLES))
+
+    def cost(delay: float) -> float:
+        """Return the mean squared error over all samples and channels, in units of full range squared [-]."""
+        errors = [
+            (np.interp(times[thinned] - delay, model_times, model) - values[thinned]) / full_range
+            for values, model, full_range in curves
+        ]
+        return sum(float(np.square(error).mean()) for error in errors) / len(errors)
+
+    shifts = np.linspace(-limit, limit, _SHIFTS).tolist()
+    best = int(np.argmin([cost(shift) for shift in shifts]))
+    bounds = shifts[max(0, best - 1)], shifts[min(_SHIFTS - 1, best + 1)]
+    value = float(minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": _ACCURACY * limit}).x)
+    # A delay counts where it explains more than noise and the accuracy of the engine could.
+    least = cost(value)
+    gain, samples = cost(0.0) - least, len(curves) * times[thinned].size
+    is_significant = gain > _SMALLEST_GAIN and gain * samples > _MINIMUM_GAIN * least
+    if abs(value) < _RESOLUTION * float(np.median(np.diff(times[thinned]))) or not is_significant:
+        return 0.0, False
+    return value, abs(value) > _AT_LIMIT * limit
 
 
 @in_units(lambda _, device, *__: device.shown)

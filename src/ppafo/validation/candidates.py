@@ -60,6 +60,45 @@ _CURVED = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 """Commands at which a curved opening is a table [-]."""
 _POWERS = (0.4, 0.7, 1.4, 2.0, 3.0)
 """Trial powers of the command to which an opening is proportional [-]."""
+_ZEROS = (-0.6, -0.3, -0.1, -0.03, -0.01, -0.003, 0.003, 0.01, 0.03, 0.1, 0.3, 0.6)
+"""Trial zero offsets of angle [rad], command [full openings] and pressures [gauge supply pressures].
+
+Grids are so fine that two Gauss-Newton steps reach the least squares, and no likely fault lies at one of their ends.
+"""
+_DELAYS = (-0.025, -0.012, -0.006, -0.003, -0.001, 0.001, 0.003, 0.006, 0.012, 0.025)
+"""Trial delays of a sensor relative to the other sensors [s]."""
+_OFF = {
+    "s": _SHIFTS,
+    "": (0.002, 0.006, 0.02, 0.06, 0.2, 0.6),
+    "Hz": (3.0, 8.0, 20.0, 50.0, 130.0, 350.0),
+    "1/s": (0.5, 2.0, 8.0, 30.0, 120.0, 500.0),
+    "m^2": (1e-8, 1e-7, 1e-6, 1e-5),
+    "kg m^2": (1e-4, 1e-3, 1e-2, 1e-1),
+    "N m": (-3.0, -0.8, -0.3, -0.1, -0.02, 0.02, 0.1, 0.3, 0.8, 3.0),
+    "N m s/rad": (1e-3, 1e-2, 1e-1, 0.9),
+    "N m/rad": (0.03, 0.15, 0.8, 4.0, 20.0),
+    "N m s^2/rad^2": (1e-4, 1e-3, 1e-2, 1e-1),
+    "kg/(s Pa^2)": (1e-18, 1e-17, 1e-16, 1e-15, 1e-14),
+    "rad/s": (0.02, 0.08, 0.35, 1.5, 6.0),
+    "N m/Pa": (1e-8, 5e-8, 2e-7, 1e-6, 5e-6),
+}
+"""Trial values of a number that is 0 in the set, by its unit."""
+_OF_GASES = {
+    "gas.molar_mass": (0.0039, 0.046),
+    "gas.heat_capacity_ratio": (1.05, 1.68),
+    "gas.temperature": (250.0, 340.0),
+}
+"""Ends of what gases in use and rooms have [SI]; other values are no cause."""
+_OF_SUPPLY = {PRESSURE_PATH: SUPPLY, SECOND_PRESSURE_PATH: DORSIFLEXION_SUPPLY}
+_EFFECTS = {
+    "stribeck": ("rad/s", "friction seems to be higher up to {:.2g} rad/s (Stribeck)"),
+    "seal_friction": ("N m/Pa", "friction seems to grow with pressure by {:.2g} N m/Pa"),
+    "joint_load.stiffness": ("N m/rad", "a spring of {:.2g} N m/rad seems to act at the joint"),
+    "joint_load.drag": ("N m s^2/rad^2", "a drag of {:.2g} N m s^2/rad^2 seems to act at the joint"),
+    "laminar_leak.coefficient": ("kg/(s Pa^2)", "a laminar leak of {:.2g} kg/(s Pa^2) seems to pass the seal"),
+    "line_resistance.area": ("m^2", "lines seem to throttle as an orifice of {:.2g} mm^2 does"),
+}
+"""Effects that a device may lack, by name and setting, or by name alone for several: unit and words."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,14 +197,12 @@ def of_samples(records: Sequence[Record]) -> Iterator[Cause]:
     faulty = [record for record in records if record.words]
     if not faulty:
         return
-    has_several = len(records) > 1
-    texts = [
-        f"{words} ({record.measured.file})" if has_several else words for record in faulty for words in record.words
-    ]
+    of_file = {True: " ({})", False: ""}[len(records) > 1]
+    texts = [words + of_file.format(record.agreement.file) for record in faulty for words in record.words]
     channels = dict.fromkeys(words.split()[0] for record in faulty for words in record.words)
     # Every channel has a sample that a sensor made among those of the start.
     has_start = all(
-        bool(record.good[:, : samples_at_rest(record.measured.recording)].any(axis=1).all()) for record in faulty
+        bool(record.good[:, : samples_at_rest(record.agreement.measured)].any(axis=1).all()) for record in faulty
     )
     yield Cause(
         f"samples of {' and '.join(channels)}",
@@ -188,19 +225,6 @@ def of_motion(records: Sequence[Record], motion: Motion) -> Iterator[Cause]:
         yield Cause("motion", words, lambda _: ModelChange(motion=other))
 
 
-def _both_ways(*sizes: float) -> tuple[float, ...]:
-    return (*(-size for size in reversed(sizes)), *sizes)
-
-
-# Grids are so fine that two Gauss-Newton steps reach the least squares, and no likely fault lies at one of their ends.
-_ZEROS = _both_ways(0.003, 0.01, 0.03, 0.1, 0.3, 0.6)
-"""Trial zero offsets of angle [rad], command [full openings] and pressures [gauge supply pressures]."""
-_DELAYS = _both_ways(0.001, 0.003, 0.006, 0.012, 0.025)
-"""Trial delays of a sensor relative to the other sensors [s]."""
-_EXACT = SensorErrors(zero=0.0, gain=0.0, delay=0.0)
-"""Usual sensor errors of a command: none, because a command is not read by a sensor."""
-
-
 def of_sensors(device: Device, names: Collection[str], units: Mapping[str, AbstractSet[str]]) -> Iterator[Cause]:
     """Yield errors of sensors and clock: zero, gain, unit, sign and delay, swapped channels, rate of the clock.
 
@@ -210,38 +234,49 @@ def of_sensors(device: Device, names: Collection[str], units: Mapping[str, Abstr
     atmosphere = device.supply.atmospheric_pressure
     gauge = max(device.supply.pressure, device.supply.dorsiflexion_pressure) - atmosphere
     unit, per_pascal = _unit_of_pressure(device)
+    chambers = tuple(name for name in (PRESSURE_1, PRESSURE_2) if name in names)
+    supplies = tuple(name for name in (SUPPLY, DORSIFLEXION_SUPPLY) if name in names)
+    pressures = (*chambers, *supplies)
+    # Pressure sensors may share an error: each, both chambers, both supplies, and all, the largest group first.
+    groups = {(name,) for name in pressures} | {chambers, supplies, pressures} - {()}
     # Sensors of one kind: their SI unit, the point [SI] about which a gain turns, the size of a zero of 1 [SI], or 0
-    # where none is tried, its unit and how many of that are 1 in SI, and the errors of any bench.
-    sensed = [
-        *((group, "Pa", atmosphere, gauge, unit, per_pascal, PRESSURE_ERRORS) for group in _groups(names)),
-        (((ANGLE,), ANGLE, "seems"), "rad", 0.0, 1.0, "deg", math.degrees(1.0), ANGLE_ERRORS),
-        (((COMMAND,), COMMAND, "seems"), "", 0.0, 1.0, "of full opening", 1.0, _EXACT),
-        (((EXTERNAL_TORQUE,), EXTERNAL_TORQUE, "seems"), "N m", 0.0, 0.0, "", 1.0, _EXACT),
+    # where none is tried, its unit and how many of that are 1 in SI, and the errors of any bench; a command has none.
+    of_pressure = ("Pa", atmosphere, gauge, unit, per_pascal, PRESSURE_ERRORS)
+    exact = SensorErrors(zero=0.0, gain=0.0, delay=0.0)
+    sensed = [(group, *of_pressure) for group in sorted(groups, key=lambda group: (-len(group), group))]
+    sensed += [
+        ((ANGLE,), "rad", 0.0, 1.0, "deg", math.degrees(1.0), ANGLE_ERRORS),
+        ((COMMAND,), "", 0.0, 1.0, "of full opening", 1.0, exact),
+        ((EXTERNAL_TORQUE,), "N m", 0.0, 0.0, "", 1.0, exact),
     ]
-    for (channels, group, verb), si_unit, about, size, unit, shown, usual in sensed:
+    for channels, si_unit, about, size, unit, shown, usual in sensed:
         if not {*channels} <= {*names, COMMAND}:
             continue
+        several = len(channels) > 1
+        group = "all pressures" if several and channels == pressures else " and ".join(channels)
+        verb = "seem" if several else "seems"
+        gained, moved = partial(_sensed, channels, "gain", about), partial(_sensed, channels, "zero", 0.0)
         if size:
-            words = f"the zero of {group} seems to be off by {{:+.3g}} {unit}"
-            zeros, change = tuple(size * part for part in _ZEROS), partial(_sensed, channels, "zero", 0.0)
-            yield Cause(f"zero of {group}", words, change, zeros, shown=shown, usual=usual.zero)
+            words, zeros = f"the zero of {group} seems to be off by {{:+.3g}} {unit}", [size * part for part in _ZEROS]
+            yield Cause(f"zero of {group}", words, moved, tuple(zeros), shown=shown, usual=usual.zero)
             words = f"{group} {verb} to read {{:.4g}} times the true value"
-            change = partial(_sensed, channels, "gain", about)
-            yield Cause(f"gain of {group}", words, change, _GAINS, is_ratio=True, usual=usual.gain)
+            yield Cause(f"gain of {group}", words, gained, _GAINS, is_ratio=True, usual=usual.gain)
         read_as = ("gauge read as absolute", -about), ("absolute read as gauge", about)
         for kind, zero in read_as if si_unit == "Pa" else ():
             words = f"{group} {verb} to be {kind}"
-            yield Cause(words, words, partial(_sensed, channels, "zero", 0.0), (zero,), is_of_unit=True)
+            yield Cause(words, words, moved, (zero,), is_of_unit=True)
         stated = set[str]().union(*(units.get(name, ()) for name in channels))
         for mistake, factor in misread_units(si_unit, stated) if si_unit and units.keys() & {*channels} else ():
             name = f"{group} {verb} to be {mistake}"
             words = f"{name}: the unit is probably wrong, by a factor of {max(factor, 1.0 / factor):.4g}"
-            yield Cause(name, words, partial(_sensed, channels, "gain", about), (factor,), is_of_unit=True)
+            yield Cause(name, words, gained, (factor,), is_of_unit=True)
     sensors = tuple(name for name in SENSORS if name in names)
     # Of one sensor alone the delay is the one of all, which is taken out.
     for name in sensors if len(sensors) > 1 else ():
-        words = f"{name} seems to lag the other channels by {{:.3g}} ms"
-        change = partial(_sensed, (name,), "delay", 0.0)
+        words, change = (
+            f"{name} seems to lag the other channels by {{:.3g}} ms",
+            partial(_sensed, (name,), "delay", 0.0),
+        )
         yield Cause(f"delay of {name}", words, change, _DELAYS, shown=1.0e3, usual=usual_errors(name).delay)
     leads = tuple(-lead for lead in _SHIFTS)
     for noun, verb, delays, shown in (("delay", "lag", _LONG_DELAYS, 1.0e3), ("lead", "lead", leads, -1.0e3)):
@@ -249,8 +284,7 @@ def of_sensors(device: Device, names: Collection[str], units: Mapping[str, Abstr
         yield Cause(f"{noun} of all sensors", words, lambda delay: ModelChange(delay=delay), delays, shown=shown)
     words = "the clock of the recording seems to run {:.4g} times as fast"
     yield Cause("rate of the clock", words, lambda rate: ModelChange(clock=rate), _RATES, is_ratio=True)
-    has_both = PRESSURE_1 in names and PRESSURE_2 in names
-    swapped = ModelChange(is_swapped=True)
+    swapped, has_both = ModelChange(is_swapped=True), len(chambers) > 1
     if has_both:
         yield Cause("swap", "pressure_1 and pressure_2 seem to be swapped", lambda _: swapped)
     for name in (COMMAND, EXTERNAL_TORQUE):
@@ -273,46 +307,6 @@ def _sensed(names: Iterable[str], kind: str, about: float, size: float) -> Model
     return ModelChange(dict.fromkeys(names, replace(SensorModel(about=about), **{kind: size})))
 
 
-def _groups(names: Collection[str]) -> Iterator[tuple[tuple[str, ...], str, str]]:
-    """Yield groups of pressure sensors that may share an error: channels, description, and "seem" or "seems".
-
-    Groups are each recorded sensor, both chambers, both supplies, and all sensors; the largest group comes first.
-    """
-    chambers = tuple(name for name in (PRESSURE_1, PRESSURE_2) if name in names)
-    supplies = tuple(name for name in (SUPPLY, DORSIFLEXION_SUPPLY) if name in names)
-    pressures = (*chambers, *supplies)
-    groups = {(name,) for name in pressures} | {chambers, supplies, pressures}
-    for channels in sorted(groups - {()}, key=lambda group: (-len(group), group)):
-        has_several = len(channels) > 1
-        words = "all pressures" if has_several and len(channels) == len(pressures) else " and ".join(channels)
-        yield channels, words, "seem" if has_several else "seems"
-
-
-_OFF = {
-    "s": _SHIFTS,
-    "": (0.002, 0.006, 0.02, 0.06, 0.2, 0.6),
-    "Hz": (3.0, 8.0, 20.0, 50.0, 130.0, 350.0),
-    "1/s": (0.5, 2.0, 8.0, 30.0, 120.0, 500.0),
-    "m^2": (1e-8, 1e-7, 1e-6, 1e-5),
-    "kg m^2": (1e-4, 1e-3, 1e-2, 1e-1),
-    "N m": _both_ways(0.02, 0.1, 0.3, 0.8, 3.0),
-    "N m s/rad": (1e-3, 1e-2, 1e-1, 0.9),
-    "N m/rad": (0.03, 0.15, 0.8, 4.0, 20.0),
-    "N m s^2/rad^2": (1e-4, 1e-3, 1e-2, 1e-1),
-    "kg/(s Pa^2)": (1e-18, 1e-17, 1e-16, 1e-15, 1e-14),
-    "rad/s": (0.02, 0.08, 0.35, 1.5, 6.0),
-    "N m/Pa": (1e-8, 5e-8, 2e-7, 1e-6, 5e-6),
-}
-"""Trial values of a number that is 0 in the set, by its unit."""
-_OF_GASES = {
-    "gas.molar_mass": (0.0039, 0.046),
-    "gas.heat_capacity_ratio": (1.05, 1.68),
-    "gas.temperature": (250.0, 340.0),
-}
-"""Ends of what gases in use and rooms have [SI]; other values are no cause."""
-_OF_SUPPLY = {PRESSURE_PATH: SUPPLY, SECOND_PRESSURE_PATH: DORSIFLEXION_SUPPLY}
-
-
 def of_numbers(request: Replay) -> Iterator[Cause]:
     """Yield every number of the set, 0 or not, with trial values, and a wrong atmosphere under gauge sensors."""
     device, recording = request.device, request.measured.recording
@@ -324,9 +318,8 @@ def of_numbers(request: Replay) -> Iterator[Cause]:
     declared = declared_numbers(scenario)
     other_forms = {f"{part}.{name}" for part in ("actuator.leak", "valve") for name in other_form(device, part)}
     off = {path for path in declared if path.startswith("effects.") and path.split(".")[1] not in device.effects}
-    left_out = {_NOT_TRIED, *other_forms, *followed, *off}
-    by_section = [path for section in _SECTIONS for path in declared if path.split(".")[0] == section]
-    for path in (path for path in by_section if path not in left_out):
+    tried = [path for path in declared if path not in {_NOT_TRIED, *other_forms, *followed, *off}]
+    for path in (path for section in _SECTIONS for path in tried if path.split(".")[0] == section):
         value, quantity = number_at(scenario, path), declared[path]
         words, base, trials = f"{path} seems to be {{:.3g}} times the model's value", value, _FACTORS
         if value == 0.0:
@@ -343,7 +336,7 @@ def of_numbers(request: Replay) -> Iterator[Cause]:
                 yield Cause(
                     path + alone,
                     words.replace(path, path + alone),
-                    partial(_scaled, "", others, {path: base}),
+                    partial(_with_number, path, base, others),
                     trials,
                     is_ratio=is_ratio,
                     usual=math.log1p(SUPPLY_ERROR / value) if path in _OF_SUPPLY else 0.0,
@@ -370,39 +363,9 @@ def _unit_of_pressure(device: Device) -> tuple[str, float]:
         return shown_unit("Pa_d").removesuffix("_d"), shown_value(1.0, "Pa_d")
 
 
-def _scaled(effect: str, others: Mapping[str, float], scales: Mapping[str, float], size: float) -> ModelChange:
-    """Return a change of an effect, or of numbers of the set, to multiples of the magnitude and ``others``."""
-    values = {**others, **{name: size * scale for name, scale in scales.items()}}
-    return ModelChange(effects={effect: values}) if effect else ModelChange(numbers=values)
-
-
-_EFFECTS: tuple[tuple[str, tuple[str, ...], dict[str, float], str, float, str], ...] = (
-    (
-        *("stribeck", ("velocity",), {"share": 0.9}, "rad/s", 1.0),
-        "friction seems to be higher up to {:.2g} rad/s (Stribeck)",
-    ),
-    (
-        *("seal_friction", ("static_per_pressure", "dynamic_per_pressure"), {}, "N m/Pa", 1.0),
-        "friction seems to grow with pressure by {:.2g} N m/Pa",
-    ),
-    (
-        *("joint_load.stiffness", ("stiffness",), {}, "N m/rad", 1.0),
-        "a spring of {:.2g} N m/rad seems to act at the joint",
-    ),
-    (
-        *("joint_load.drag", ("drag",), {}, "N m s^2/rad^2", 1.0),
-        "a drag of {:.2g} N m s^2/rad^2 seems to act at the joint",
-    ),
-    (
-        *("laminar_leak.coefficient", ("coefficient",), {}, "kg/(s Pa^2)", 1.0),
-        "a laminar leak of {:.2g} kg/(s Pa^2) seems to pass the seal",
-    ),
-    (
-        *("line_resistance.area", ("area",), {}, "m^2", 1e6),
-        "lines seem to throttle as an orifice of {:.2g} mm^2 does",
-    ),
-)
-"""Effects that a device may have: settings equal to the magnitude, other settings, unit, shown units in 1 SI, words."""
+def _with_number(path: str, base: float, others: Mapping[str, float], size: float) -> ModelChange:
+    """Return a change of a number of the set to a multiple of ``base``, and of ``others`` to their values [SI]."""
+    return ModelChange(numbers={**others, path: size * base})
 
 
 def of_effects(device: Device) -> Iterator[Cause]:
@@ -412,16 +375,20 @@ def of_effects(device: Device) -> Iterator[Cause]:
         yield Cause("opening", "the valve seems to open by a straight line, not by its table", lambda _: straight)
     elif device.valve.kind == "proportional":
         words = "the valve seems to open by the power {:.2g} of its command"
-        yield Cause("opening", words, _opening_to_the_power, _POWERS, is_ratio=True)
-    for name, settings, others, unit, shown, words in _EFFECTS:
-        effect = name.partition(".")[0]
-        if effect not in device.effects:
-            change = partial(_scaled, effect, others, dict.fromkeys(settings, 1.0))
+        yield Cause("opening", words, partial(_with_effect, "opening"), _POWERS, is_ratio=True)
+    for name, (unit, words) in _EFFECTS.items():
+        if name.partition(".")[0] not in device.effects:
+            change, shown = partial(_with_effect, name), 1.0e6 if unit == "m^2" else 1.0
             yield Cause(name, words, change, _OFF[unit], is_ratio=True, shown=shown, is_off=True)
 
 
-def _opening_to_the_power(power: float) -> ModelChange:
-    nodes: dict[str, float] = {}
-    for number, command in enumerate(_CURVED, 1):
-        nodes |= {f"command_{number:02}": command, f"opening_{number:02}": command**power}
-    return ModelChange(effects={"opening": nodes})
+def _with_effect(name: str, size: float) -> ModelChange:
+    """Return a change of the effect ``name``, or of its setting of a full name, to a magnitude."""
+    effect, _, setting = name.partition(".")
+    settings = {
+        "opening": {f"command_{number:02}": command for number, command in enumerate(_CURVED, 1)}
+        | {f"opening_{number:02}": command**size for number, command in enumerate(_CURVED, 1)},
+        "stribeck": {"velocity": size, "share": 0.9},
+        "seal_friction": {"static_per_pressure": size, "dynamic_per_pressure": size},
+    }
+    return ModelChange(effects={effect: {setting: size} if setting else settings[effect]})

@@ -10,7 +10,7 @@ for a change with a fitted magnitude, else 0.
 """
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import reduce
@@ -22,15 +22,14 @@ from scipy.stats import chi2
 
 from ppafo.errors import PpafoError
 from ppafo.linear_algebra import on_one_thread
-from ppafo.parameters.device import Device
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.recording import Floats
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.recorded.channels import COMMAND
+from ppafo.simulation.recorded.rest import samples_at_rest
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit, usual_errors
 from ppafo.validation.agreement import RecordingAgreement, agreement_of, compare_recording, replay_of
 from ppafo.validation.candidates import Cause, of_effects, of_motion, of_numbers, of_samples, of_sensors
-from ppafo.validation.measured import MeasuredRecording
 from ppafo.validation.record import (
     ONLY_NOISE,
     SENSORS,
@@ -44,10 +43,9 @@ from ppafo.validation.record import (
     joined,
     record_of,
     residuals_of,
-    starts_without_wrong,
 )
 from ppafo.validation.replay import Replay, Replayed, replay_together, replayed_scenario
-from ppafo.validation.settings import ANGLE, EXPLAINED_FRACTION, ReplaySettings
+from ppafo.validation.settings import ANGLE, EXPLAINED_FRACTION
 
 _TIMES = {"milliseconds read as seconds": 1.0e3, "seconds read as milliseconds": 1.0e-3}
 """Clock rate [-] that corrects misread times, by kind of mistake."""
@@ -109,43 +107,33 @@ class Diagnosis:
 
 
 @on_one_thread
-def causes_of(
-    read: Sequence[MeasuredRecording],
-    agreements: Sequence[RecordingAgreement],
-    device: Device,
-    settings: ReplaySettings,
-    report: Report = report_nothing,
-) -> Diagnosis:
-    """Return the single cause that explains all recordings together, or a diagnosis without a cause.
-
-    ``agreements`` are the comparisons of the recordings ``read``, in the same order.
-    """
-    if (other_unit := _in_other_unit(read, agreements, device, settings)) is not None:
+def causes_of(agreements: Sequence[RecordingAgreement], report: Report = report_nothing) -> Diagnosis:
+    """Return the single cause that explains all recordings together, or a diagnosis without a cause."""
+    if (other_unit := _in_other_unit(agreements)) is not None:
         return Diagnosis(other_unit, None, 1)
-    pairs = zip(read, agreements, strict=True)
-    records = [record_of(measured, agreement, device, settings) for measured, agreement in pairs]
-    search = CauseSearch(device, settings, records, report)
+    records = [record_of(agreement) for agreement in agreements]
+    search = CauseSearch(records, report)
     none = search.evaluated([ModelChange()])[0]
     if none is None or none.is_noise:
         return Diagnosis(is_noise=none is not None)
     search = replace(search, none=none)
-    tried = list[Cause]()
-    for visible in (of_samples(records), of_motion(records, settings.motion)):
+    tried, motion = list[Cause](), agreements[0].request.settings.motion
+    for visible in (of_samples(records), of_motion(records, motion)):
         tried += search.compared([*visible])
         if any(cause.explains for cause in tried):
             return search.explained(tried, [])
-    is_measured = settings.motion == "measured"
-    if is_measured and sum(measured.recording.duration for measured in read) > _LONGEST_SEARCHED:
+    is_measured = motion == "measured"
+    if is_measured and sum(agreement.measured.duration for agreement in agreements) > _LONGEST_SEARCHED:
         # Hundreds of replays of a minute each would take minutes of computing time.
         return Diagnosis(tried=len(tried), kinds=_TRIED_IN_LONG_RECORDINGS)
-    rows, lacking = _rows(read, agreements, device, settings)
+    rows, lacking = _rows(agreements)
     sized = [row for row in rows if row.has_size]
     # Errors that any bench has come before a fault, a mistake without a size too: they need no cause.
     of_bench = search.compared([row for row in sized if row.usual])
     explaining = [cause for cause in of_bench if cause.explains]
     usual = [cause for cause in explaining if cause.is_usual]
     # A delay that ends at its limit is longer than that, and no error of any bench.
-    is_late = any(agreement.delay.is_at_limit for agreement in agreements)
+    is_late = any(agreement.is_at_limit for agreement in agreements)
     if not usual and not is_late:
         # Beside pressures that are nearly equal a flow bends: what is small together may fail on straight lines, and
         # not alone. One error beyond its limit explains more than several that strain to add up to it.
@@ -162,23 +150,18 @@ def causes_of(
     return search.unexplained(tried, _TRIED_WITH_MEASURED_ANGLE if is_measured else "")
 
 
-def _rows(
-    read: Sequence[MeasuredRecording],
-    agreements: Sequence[RecordingAgreement],
-    device: Device,
-    settings: ReplaySettings,
-) -> tuple[list[Cause], list[Cause]]:
+def _rows(agreements: Sequence[RecordingAgreement]) -> tuple[list[Cause], list[Cause]]:
     """Return causes in sensors, clock and numbers of the set, and effects that the model lacks.
 
     With a measured angle they leave out what changes an input or the motion of the model.
     """
-    recordings = [measured.recording for measured in read]
+    request = agreements[0].request
+    recordings, device = [agreement.measured for agreement in agreements], request.device
     names = set.intersection(*(set(recording.names) for recording in recordings))
     # A channel moves that departs, measured or modelled, from the atmosphere by more than a zero error.
     moving = {
         name
-        for agreement in agreements
-        for recording in (agreement.measured, agreement.model)
+        for recording in (*recordings, *(agreement.model for agreement in agreements))
         for name in recording.names
         if float(np.abs(recording[name] - device.supply.atmospheric_pressure).max()) > usual_errors(name).zero
     }
@@ -189,19 +172,14 @@ def _rows(
         sections = {path.partition(".")[0] for path in (*change.numbers, *change.effects)}
         has_delay = change.has_delay or any(sensor.delay for sensor in change.sensors.values())
         is_of_input = bool({COMMAND, ANGLE} & change.sensors.keys() or sections & {*_OF_MOTION})
-        return settings.motion != "measured" or not (is_of_input or has_delay or change.clock != 1.0)
+        return request.settings.motion != "measured" or not (is_of_input or has_delay or change.clock != 1.0)
 
     # Numbers of the set are compared with sensors: the gain of a command is the area of its valve.
-    rows = [*of_sensors(device, names, units), *of_numbers(replay_of(read[0], device, settings))]
+    rows = [*of_sensors(device, names, units), *of_numbers(request)]
     return [*filter(is_tried, rows)], [*filter(is_tried, of_effects(device))]
 
 
-def _in_other_unit(
-    read: Sequence[MeasuredRecording],
-    agreements: Sequence[RecordingAgreement],
-    device: Device,
-    settings: ReplaySettings,
-) -> Cause | None:
+def _in_other_unit(agreements: Sequence[RecordingAgreement]) -> Cause | None:
     """Return milliseconds read as seconds (or the reverse) as cause if the model agrees only with the corrected times.
 
     With corrected times the model must explain half of the variance of every signal that moves, and every error above
@@ -211,14 +189,14 @@ def _in_other_unit(
     if all(agreement.passes for agreement in agreements):
         return None
     # Hardly any bench samples so often, and a run a thousand times as long is not made for others.
-    is_short = max(np.median(np.diff(measured.recording.time)) for measured in read) <= _SHORT_INTERVAL
+    is_short = max(np.median(np.diff(agreement.measured.time)) for agreement in agreements) <= _SHORT_INTERVAL
     name = "seconds read as milliseconds" if is_short else "milliseconds read as seconds"
-    rate = _TIMES[name]
     gain, left = 0.0, 0.0
-    for measured, as_read in zip(read, agreements, strict=True):
+    for as_read in agreements:
+        request = as_read.request
+        in_other = replace(request.measured, recording=at_rate(as_read.measured, _TIMES[name]))
         try:
-            in_other = replace(measured, recording=at_rate(measured.recording, rate))
-            other = compare_recording(in_other, device, settings)
+            other = compare_recording(in_other, request.device, request.settings)
         except PpafoError:
             return None
         for before, after in zip(as_read.channels, other.channels, strict=True):
@@ -231,18 +209,16 @@ def _in_other_unit(
                 gain += 2.0 * len(as_read.measured) * math.log(ratio)
             left = max(left, after.in_noise)
     words = f"times seem to be in {name}"
-    return Cause(name, words, lambda rate: ModelChange(clock=rate), size=rate, gain=gain, left=left)
+    return Cause(name, words, lambda rate: ModelChange(clock=rate), size=_TIMES[name], gain=gain, left=left)
 
 
 @dataclass(frozen=True, slots=True)
 class CauseSearch:
-    """Recordings of a device on which changes are tried; ``report`` receives the progress.
+    """Recordings on which changes are tried; ``report`` receives the progress.
 
     ``none`` are the residuals without a change.
     """
 
-    device: Device
-    settings: ReplaySettings
     records: list[Record]
     report: Report
     none: ScaledResiduals = UNTRIED
@@ -267,49 +243,25 @@ class CauseSearch:
         evaluated: list[ScaledResiduals | None] = []
         for start in range(0, len(changes), _TOGETHER):
             self.report(Progress("searching for causes", start, len(changes), noun="changes"))
-            batch, rows = changes[start : start + _TOGETHER], list[list[Replay]]()
-            for change in batch:
-                rows.append([])
-                with suppress(PpafoError):
-                    rows[-1] += [self._request(record, change) for record in self.records]
+            batch = changes[start : start + _TOGETHER]
+            rows = [self._requests(change) for change in batch]
             replayed = iter(replay_together([request for row in rows for request in row]))
             for change, row in zip(batch, rows, strict=True):
                 residuals = [
-                    residuals_of(record, result, change, self.settings.longest_delay)
+                    residuals_of(record, result, change)
                     for result, record in zip(islice(replayed, len(row)), self.records, strict=False)
                     if isinstance(result, Replayed)
                 ]
-                evaluated.append(
-                    ScaledResiduals(*map(np.concatenate, zip(*residuals, strict=True)))
-                    if len(residuals) == len(self.records)
-                    else None
-                )
+                is_whole = len(residuals) == len(self.records)
+                joint = map(np.concatenate, zip(*residuals, strict=True))
+                evaluated.append(ScaledResiduals(*joint) if is_whole else None)
         return evaluated
 
-    def _request(self, record: Record, change: ModelChange) -> Replay:
-        """Return the replay of a corrected recording on the changed device. Raises PpafoError for an invalid device."""
-        recording, settings = record.measured.recording, self.settings
-        for name, sensor in change.sensors.items():
-            if name in recording:
-                values = sensor.true(recording[name])
-                values = np.clip(values, -1.0, 1.0) if name == COMMAND else values
-                recording = recording.with_channel(name, values, recording.unit(name))
-        if change.is_swapped:
-            swapped = {name: recording[other] for name, other in SWAPPED.items()}
-            for name, values in swapped.items():
-                recording = recording.with_channel(name, values, recording.unit(name))
-        if change.clock != 1.0:
-            recording = at_rate(recording, change.clock)
-        if change.start is not None:
-            starts = starts_without_wrong(record, self.device, change.start)
-            settings = replace(settings, initial={**starts, **settings.initial})
-        settings = replace(settings, motion=change.motion or settings.motion)
-        request = replay_of(replace(record.measured, recording=recording), self.device, settings)
-        device = replace(request.device, effects={**request.device.effects, **change.effects})
-        if change.numbers:
-            scenario = replace(replayed_scenario(request), device=device)
-            device = with_numbers(scenario, change.numbers).device
-        return replace(request, device=device)
+    def _requests(self, change: ModelChange) -> list[Replay]:
+        """Return the replays of the corrected recordings on the changed device; empty for an invalid device."""
+        with suppress(PpafoError):
+            return [_request(record, change) for record in self.records]
+        return []
 
     def _at(self, cause: Cause, size: float, residuals: ScaledResiduals) -> Cause:
         """Return a cause at a magnitude, with its residuals and its gain G [-]."""
@@ -344,29 +296,25 @@ class CauseSearch:
                 improved = sorted(improved, key=lambda cause: -cause.gain)[:_BEST]
             if step >= STEPS + _OF_BEST:
                 improved = [cause for cause in improved if cause.name in rising]
-            trials = self._improved(improved, worse) if step < STEPS + _OF_BEST + _OF_RISING else []
+            if step == STEPS + _OF_BEST + _OF_RISING:
+                break
+            # A step that went too far is taken again, shorter; the others end between neighbours on their grids.
+            trials = [
+                (cause, cause.size + _SHORTER * (worse[cause.name] - cause.size))
+                for cause in improved
+                if cause.name in worse
+            ]
+            ends, moved = dict[str, tuple[float, float]](), list[_Trial]()
+            for cause in (cause for cause in improved if cause.name not in worse):
+                grid = sorted(cause.grid)
+                nearest = int(np.argmin(np.abs(np.array(grid) - cause.size)))
+                low, high = ends[cause.name] = grid[max(0, nearest - 1)], grid[min(len(grid) - 1, nearest + 1)]
+                length = _DIFFERENCE * (high - low)
+                moved.append((cause, cause.at(cause.size + length), cause.residuals.errors, length))
+            for cause, slope in self._slopes(moved):
+                (low, high), square = ends[cause.name], max(float(slope @ slope), _SMALLEST)
+                trials.append((cause, min(max(cause.size - float(slope @ cause.residuals.errors) / square, low), high)))
         return [cause for cause in best.values() if cause.is_inside or not cause.has_size]
-
-    def _improved(self, causes: Sequence[Cause], worse: Mapping[str, float]) -> list[tuple[Cause, float]]:
-        """Return the magnitude of each cause after a Gauss-Newton step, kept between neighbouring grid points.
-
-        A step that led to a ``worse`` magnitude is taken again, shorter.
-        """
-        shorter = [cause for cause in causes if cause.name in worse]
-        improved = [(cause, cause.size + _SHORTER * (worse[cause.name] - cause.size)) for cause in shorter]
-        stepping = [cause for cause in causes if cause.name not in worse]
-        ends, trials = dict[str, tuple[float, float]](), list[_Trial]()
-        for cause in stepping:
-            grid = sorted(cause.grid)
-            nearest = int(np.argmin(np.abs(np.array(grid) - cause.size)))
-            low, high = ends[cause.name] = grid[max(0, nearest - 1)], grid[min(len(grid) - 1, nearest + 1)]
-            length = _DIFFERENCE * (high - low)
-            trials.append((cause, cause.at(cause.size + length), cause.residuals.errors, length))
-        for cause, slope in self._slopes(trials):
-            errors, (low, high) = cause.residuals.errors, ends[cause.name]
-            size = cause.size - float(slope @ errors) / max(float(slope @ slope), _SMALLEST)
-            improved.append((cause, min(max(size, low), high)))
-        return improved
 
     def _slopes(self, trials: Sequence[_Trial]) -> list[Slope]:
         """Return the derivatives of the errors by the magnitude of each cause that can be replayed."""
@@ -380,7 +328,7 @@ class CauseSearch:
     def slopes(self, change: ModelChange, errors: Floats, rows: Sequence[Cause]) -> list[Slope]:
         """Return the derivatives of the ``errors`` under a change, by the magnitude of each additional cause."""
         # A delay of all sensors is free already, unless the change has one itself.
-        is_free = self.settings.longest_delay > 0.0 and not change.has_delay
+        is_free = self.records[0].agreement.request.settings.longest_delay > 0.0 and not change.has_delay
         trials = list[_Trial]()
         for row in rows:
             # From what is off no straight line leads to a ratio.
@@ -410,34 +358,6 @@ class CauseSearch:
         change = reduce(joined, [cause.at(size) for (cause, _), size in zip(slopes, sizes, strict=True)])
         words = "zeros, gains and delays of several sensors seem to be off"
         return [Cause("several sensors", words, lambda _: change, (1.0,), usual=1.0)]
-
-    def beside_usual(self, slopes: Sequence[Slope], known: Collection[str]) -> list[Cause]:
-        """Return unusually large changes that explain the recordings together with usual sensor errors.
-
-        Magnitudes come from a linear fit, and a replay verifies each. Usual errors cost no penalty. Names in ``known``
-        are left out.
-        """
-        none, usual = self.none.errors, [item for item in slopes if item[0].is_of_bench]
-        sized, changes = list[tuple[Cause, float]](), list[ModelChange]()
-        for cause, slope in slopes:
-            if cause.name in known:
-                continue
-            others = [item for item in usual if item[0] is not cause]
-            sizes = _bounded([(replace(cause, usual=math.inf), slope), *others], none)
-            fitted, size = list(zip([(cause, slope), *others], sizes, strict=True)), sizes[0]
-            errors = none + sum(part * item for (_, item), part in fitted)
-            # A straight line leaves some more; what leaves far more is no small change, nor is what its grid does not
-            # reach: of a logarithm such a size would be no number any more.
-            is_inside = min(cause.grid) < size < max(cause.grid)
-            if is_inside and float(errors @ errors) < 2.0 * ONLY_NOISE * len(errors) and abs(size) > cause.usual:
-                sized.append((cause, size))
-                changes.append(reduce(joined, [item.at(part) for (item, _), part in fitted]))
-        causes = [
-            self._at(cause, size, residuals)
-            for (cause, size), residuals in zip(sized, self.evaluated(changes), strict=True)
-            if residuals is not None
-        ]
-        return [cause for cause in causes if cause.explains and cause.is_inside]
 
     def needs_another(self, first: Cause, slopes: Sequence[Slope]) -> bool:
         """Return whether the residuals left by the first change need a second, unusually large change.
@@ -474,18 +394,37 @@ class CauseSearch:
         """Return the best cause with its alternatives, or a diagnosis without a cause if a second one is needed.
 
         Some of the causes ``tried`` explain the recordings; ``sized`` are causes with a magnitude, to combine with one.
+        Alternatives are also unusually large changes that explain the recordings together with usual sensor errors,
+        which cost no penalty: their magnitudes come from a linear fit, and a replay verifies each.
         """
         explaining = [cause for cause in tried if cause.explains]
-        first = max(explaining, key=lambda cause: cause.gain)
+        first, known = max(explaining, key=lambda cause: cause.gain), {cause.name for cause in explaining}
         # A cause without a size to fit, a swap or a sign, cannot pass for two other changes.
         is_fitted = first.has_size and not first.is_of_samples
         # One Jacobian, at the first cause, shows what a second one would add and what could replace it.
         slopes = self.slopes(first.fitted, first.residuals.errors, sized) if is_fitted else []
         if self.needs_another(first, slopes):
             return Diagnosis(None, first, len(tried), has_second=True)
-        # With errors of sensors that any bench has, other small changes may explain as much as one alone.
-        others = self.beside_usual(slopes, {cause.name for cause in explaining})
-        return Diagnosis(self.best_of(explaining, others), None, len(tried))
+        none, usual = self.none.errors, [item for item in slopes if item[0].is_of_bench]
+        larger, changes = list[tuple[Cause, float]](), list[ModelChange]()
+        for cause, slope in (item for item in slopes if item[0].name not in known):
+            others = [item for item in usual if item[0] is not cause]
+            sizes = _bounded([(replace(cause, usual=math.inf), slope), *others], none)
+            fitted, size = list(zip([(cause, slope), *others], sizes, strict=True)), sizes[0]
+            errors = none + sum(part * item for (_, item), part in fitted)
+            # A straight line leaves some more; what leaves far more is no small change, nor is what its grid does not
+            # reach: of a logarithm such a size would be no number any more.
+            is_inside = min(cause.grid) < size < max(cause.grid)
+            if is_inside and float(errors @ errors) < 2.0 * ONLY_NOISE * len(errors) and abs(size) > cause.usual:
+                larger.append((cause, size))
+                changes.append(reduce(joined, [item.at(part) for (item, _), part in fitted]))
+        beside = [
+            self._at(cause, size, residuals)
+            for (cause, size), residuals in zip(larger, self.evaluated(changes), strict=True)
+            if residuals is not None
+        ]
+        together = [cause for cause in beside if cause.explains and cause.is_inside]
+        return Diagnosis(self.best_of(explaining, together), None, len(tried))
 
     def best_of(self, named: Sequence[Cause], others: Sequence[Cause] = ()) -> Cause:
         """Return the best of the ``named`` causes, with all causes that the recordings cannot distinguish from it.
@@ -526,11 +465,11 @@ class CauseSearch:
 
         It is what a validation finds once the cause is mended, with its rule for the common delay: none at its limit.
         """
-        requests = [self._request(record, cause.fitted) for cause in causes for record in self.records]
-        replays, left = zip(requests, replay_together(requests), strict=True), list[float]()
-        for cause in causes:
+        rows, left = [self._requests(cause.fitted) for cause in causes], list[float]()
+        replays = iter(replay_together([request for row in rows for request in row]))
+        for cause, row in zip(causes, rows, strict=True):
             change, errors = cause.fitted, list[float]()
-            for request, replayed in islice(replays, len(self.records)):
+            for request, record, replayed in zip(row, self.records, islice(replays, len(row)), strict=True):
                 assert isinstance(replayed, Replayed), "the search has replayed it"
                 recording = request.measured.recording
                 for name, sensor in change.sensors.items():
@@ -538,12 +477,50 @@ class CauseSearch:
                         values = np.interp(recording.time + sensor.delay, recording.time, recording[name])
                         recording = recording.with_channel(name, values, recording.unit(name))
                 in_step = replace(request.measured, recording=recording)
-                corrected = replace(request, measured=in_step, settings=self.settings)
+                corrected = replace(request, measured=in_step, settings=record.agreement.request.settings)
                 agreement = agreement_of(corrected, replayed, abs(change.delay) or None)
                 errors += [channel.in_noise for channel in agreement.channels]
             # Wrong samples are left out of the errors of the search alone.
             left.append(max(errors) if change.start is None else cause.left)
         return left
+
+
+def _request(record: Record, change: ModelChange) -> Replay:
+    """Return the replay of a corrected recording on the changed device. Raises PpafoError for an invalid device.
+
+    Without its faulty samples a channel starts from the mean of the valid ones, or from the share of its range that the
+    change states.
+    """
+    request = record.agreement.request
+    measured, device, settings = request.measured, request.device, request.settings
+    recording, initial = measured.recording, dict(settings.initial)
+    for name, sensor in change.sensors.items():
+        if name in recording:
+            values = sensor.true(recording[name])
+            values = np.clip(values, -1.0, 1.0) if name == COMMAND else values
+            recording = recording.with_channel(name, values, recording.unit(name))
+    if change.is_swapped:
+        swapped = {name: recording[other] for name, other in SWAPPED.items()}
+        for name, values in swapped.items():
+            recording = recording.with_channel(name, values, recording.unit(name))
+    if change.clock != 1.0:
+        recording = at_rate(recording, change.clock)
+    if change.start is not None:
+        actuator, supply, count = device.actuator, device.supply, samples_at_rest(measured.recording)
+        for name, values, good in zip(record.channels, record.values * record.noise[:, None], record.good, strict=True):
+            valid = values[:count][good[:count] > 0.0]
+            if name in SENSORS and len(valid) < count:
+                low, high = supply.atmospheric_pressure, max(supply.pressure, supply.dorsiflexion_pressure)
+                if name == ANGLE:
+                    low, high = actuator.angle_min, actuator.angle_max
+                initial.setdefault(name, float(valid.mean()) if len(valid) else low + change.start * (high - low))
+    settings = replace(settings, initial=initial, motion=change.motion or settings.motion)
+    request = replay_of(replace(measured, recording=recording), device, settings)
+    device = replace(request.device, effects={**request.device.effects, **change.effects})
+    if change.numbers:
+        scenario = replace(replayed_scenario(request), device=device)
+        device = with_numbers(scenario, change.numbers).device
+    return replace(request, device=device)
 
 
 def _bounded(slopes: Sequence[Slope], errors: Floats) -> list[float]:
@@ -552,14 +529,10 @@ def _bounded(slopes: Sequence[Slope], errors: Floats) -> list[float]:
     Each usual limit acts as a prior, so that a magnitude on which the errors carry no information stays small. A cause
     with an infinite usual magnitude is not bounded.
     """
+    limits = np.array([cause.usual for cause, _ in slopes])
     # In units of its limit, or of its slope, each has one size, whatever its own unit is.
-    scales = np.array(
-        [
-            cause.usual if math.isfinite(cause.usual) else 1.0 / max(float(np.linalg.norm(slope)), _SMALLEST)
-            for cause, slope in slopes
-        ]
-    )
-    limits = np.array([1.0 if math.isfinite(cause.usual) else math.inf for cause, _ in slopes])
+    norms = np.array([max(float(np.linalg.norm(slope)), _SMALLEST) for _, slope in slopes])
+    scales, limits = np.where(np.isfinite(limits), limits, 1.0 / norms), np.where(np.isfinite(limits), 1.0, math.inf)
     columns = np.stack([slope for _, slope in slopes], axis=1) * scales
     prior = np.diag(np.where(np.isfinite(limits), 1.0 / deviation_of_limit(1.0), 0.0))
     rows, right_side = np.concatenate([columns, prior]), np.concatenate([-errors, np.zeros(len(limits))])

@@ -70,15 +70,12 @@ def read_measured(
     With ``columns``, a file is read through this column map, which messages call ``map_name``. Raises DataError if the
     recording cannot be compared with a model.
     """
-    if not isinstance(source, Recording | str | Path):
-        source = read_recording(source, atmosphere=device.supply.atmospheric_pressure)
-    if isinstance(source, Recording):
-        values = [source.time, *(source[name] for name in sorted(source.names))]
-        return check_recording(
-            source, device, source.label, hashlib.sha256(np.concatenate(values).tobytes()).hexdigest()
-        )
-    place = Path(source)
     atmosphere = device.supply.atmospheric_pressure
+    if not isinstance(source, str | Path):
+        given = source if isinstance(source, Recording) else read_recording(source, atmosphere=atmosphere)
+        values = np.concatenate([given.time, *(given[name] for name in sorted(given.names))])
+        return check_recording(given, device, given.label, hashlib.sha256(values.tobytes()).hexdigest())
+    place = Path(source)
     if columns is None or place.is_dir():
         recording = read_recording(place, atmosphere=atmosphere)
     else:
@@ -114,11 +111,23 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     count = len(recording)
     if count < MINIMUM_SAMPLES:
         raise DataError(f"{file}: has {count_of(count, 'sample')}; at least {MINIMUM_SAMPLES} are needed")
-    remarks = _check_names(recording, file)
+    known = (COMMAND, SUPPLY, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, *COMPARED)
+    unknown = [name for name in recording.names if name not in CHANNELS]
+    for name in unknown:
+        if hint := nearest_name(name, [absent for absent in known if absent not in recording]):
+            raise DataError(f"{file}: channel '{name}' is unknown{hint}")
+    if COMMAND not in recording:
+        names = ", ".join(recording.names)
+        raise DataError(f"{file}: there is no channel '{COMMAND}', which the replay needs; available: {names}")
+    compared = [name for name in COMPARED if name in recording]
+    if not compared:
+        raise DataError(f"{file}: has none of the channels to compare: {', '.join(COMPARED)}")
+    remarks = [f"channel '{name}' is unknown and was ignored" for name in unknown]
     check_gaps(recording, file)
     check_command(recording, file)
     # Values out of reach of the device are a damaged line, or a unit wrong by powers of ten.
-    highest = max(device.supply.pressure, device.supply.dorsiflexion_pressure)
+    supply = device.supply
+    highest = max(supply.pressure, supply.dorsiflexion_pressure)
     supplies = (SUPPLY, DORSIFLEXION_SUPPLY)
     for name in (name for name in (*supplies, *COMPARED) if name in recording):
         full_range = highest if name in supplies else COMPARED[name].full_range(device, highest)
@@ -129,16 +138,24 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
                 f"{file}: '{name}' is {shown_text(recording[name][worst], recording.unit(name))} at {where}, more than "
                 f"{_MAXIMUM_RANGES:g} times what {device.name} can reach"
             )
-    _check_pressures(recording, device, file)
+    check_absolute(recording, supply.atmospheric_pressure, file)
+    owner = f"the recorded '{SUPPLY}'" if SUPPLY in recording else f"the supply of {device.name}"
+    recorded = {name: float(recording[name].max()) for name in supplies if name in recording}
+    first = recorded.get(SUPPLY, supply.pressure)
+    highest = max(first, recorded.get(DORSIFLEXION_SUPPLY, recorded.get(SUPPLY, supply.dorsiflexion_pressure)))
+    allowed = highest + _ABOVE_SUPPLY * (highest - supply.atmospheric_pressure)
+    for name in (name for name in (PRESSURE_1, PRESSURE_2) if name in recording):
+        level = max(float(recording[name][0]), float(np.median(recording[name])))
+        if level > allowed * (1.0 + _ROUNDING):
+            shown = [shown_text(pressure, "Pa_a", ".4g", supply.atmospheric_pressure) for pressure in (level, highest)]
+            raise DataError(f"{file}: '{name}' stays at {shown[0]}, above {owner}, {shown[1]}")
     gauge = supply_gauge(recording, device)
     if gauge <= 0.0:
-        owner = f"the recorded '{SUPPLY}'" if SUPPLY in recording else f"the supply of {device.name}"
         raise DataError(
             f"{file}: {owner} must be above atmospheric pressure, because errors of pressure are fractions of its "
             "gauge pressure"
         )
     # Every model would agree with a recording in which no channel changes.
-    compared = [name for name in COMPARED if name in recording]
     fractions = [lasting_change(recording[name]) / COMPARED[name].full_range(device, gauge) for name in compared]
     if max(fractions) < _MINIMUM_CHANGE:
         raise DataError(
@@ -149,41 +166,8 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     wide = np.flatnonzero(intervals > _REMARKED_GAP * np.median(intervals))
     if wide.size:
         gaps, first = count_of(wide.size, "gap"), float(recording.time[wide[0]])
-        remarks += (f"{gaps} in time, the first after {first:.6g} s; inputs were constant across gaps",)
-    return MeasuredRecording(file, sha256, recording, remarks)
-
-
-def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
-    """Check channel names: raise DataError if misspelt or missing, return remarks on unknown channels."""
-    used = (COMMAND, SUPPLY, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, *COMPARED)
-    missing = [name for name in used if name not in recording]
-    unknown = [name for name in recording.names if name not in CHANNELS]
-    for name in unknown:
-        if hint := nearest_name(name, missing):
-            raise DataError(f"{file}: channel '{name}' is unknown{hint}")
-    if COMMAND not in recording:
-        names = ", ".join(recording.names)
-        raise DataError(f"{file}: there is no channel '{COMMAND}', which the replay needs; available: {names}")
-    if not any(name in recording for name in COMPARED):
-        raise DataError(f"{file}: has none of the channels to compare: {', '.join(COMPARED)}")
-    return tuple(f"channel '{name}' is unknown and was ignored" for name in unknown)
-
-
-def _check_pressures(recording: Recording, device: Device, file: str) -> None:
-    """Raise DataError for pressures that cannot be absolute, and for chamber pressures above their supply."""
-    supply = device.supply
-    check_absolute(recording, supply.atmospheric_pressure, file)
-    recorded = {name: float(recording[name].max()) for name in (SUPPLY, DORSIFLEXION_SUPPLY) if name in recording}
-    first = recorded.get(SUPPLY, supply.pressure)
-    second = recorded.get(DORSIFLEXION_SUPPLY, recorded.get(SUPPLY, supply.dorsiflexion_pressure))
-    highest = max(first, second)
-    allowed = highest + _ABOVE_SUPPLY * (highest - supply.atmospheric_pressure)
-    for name in (name for name in (PRESSURE_1, PRESSURE_2) if name in recording):
-        level = max(float(recording[name][0]), float(np.median(recording[name])))
-        if level > allowed * (1.0 + _ROUNDING):
-            shown = [shown_text(pressure, "Pa_a", ".4g", supply.atmospheric_pressure) for pressure in (level, highest)]
-            owner = f"the recorded '{SUPPLY}'" if SUPPLY in recording else f"the supply of {device.name}"
-            raise DataError(f"{file}: '{name}' stays at {shown[0]}, above {owner}, {shown[1]}")
+        remarks.append(f"{gaps} in time, the first after {first:.6g} s; inputs were constant across gaps")
+    return MeasuredRecording(file, sha256, recording, tuple(remarks))
 
 
 def supply_gauge(recording: Recording, device: Device) -> float:

@@ -12,20 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.parameters.device import Device
 from ppafo.signals.faults import correlated_noise_of, isolated_samples
 from ppafo.signals.recording import Floats, Recording
 from ppafo.simulation.recorded.rest import samples_at_rest
-from ppafo.validation.agreement import (
-    ENGINE_ERROR,
-    ChannelAgreement,
-    RecordingAgreement,
-    noise_in,
-    replay_of,
-)
-from ppafo.validation.measured import MeasuredRecording
-from ppafo.validation.replay import Replay, Replayed, replay_together
-from ppafo.validation.settings import ANGLE, PRESSURE_1, PRESSURE_2, Motion, ReplaySettings
+from ppafo.validation.agreement import ENGINE_ERROR, ChannelAgreement, RecordingAgreement, noise_in
+from ppafo.validation.replay import Replayed, replay_together
+from ppafo.validation.settings import ANGLE, PRESSURE_1, PRESSURE_2, Motion
 from ppafo.wording import argument_text
 
 Flags = NDArray[np.bool_]
@@ -111,11 +103,11 @@ class Record(NamedTuple):
 
     ``noise`` [SI] and ``engine``, the integration error divided by the noise [-], are by channel. ``good`` is 1 for
     valid samples and 0 for faulty ones, which ``words`` describes; ``has_few`` is true if the faulty samples are
-    isolated and no more than usual. ``delay`` [s] was estimated with the unchanged model. ``starts`` are the changes of
-    the readings for one standard error of each initial value.
+    isolated and no more than usual. ``starts`` are the changes of the readings for one standard error of each initial
+    value.
     """
 
-    measured: MeasuredRecording
+    agreement: RecordingAgreement
     channels: tuple[str, ...]
     values: Floats
     noise: Floats
@@ -123,7 +115,6 @@ class Record(NamedTuple):
     good: Floats
     words: tuple[str, ...]
     has_few: bool
-    delay: float
     starts: tuple[Floats, ...] = ()
 
 
@@ -143,125 +134,87 @@ UNTRIED = ScaledResiduals(np.zeros(0), np.zeros(0))
 """Residuals of a change that was not tried yet."""
 
 
-def record_of(
-    measured: MeasuredRecording, agreement: RecordingAgreement, device: Device, settings: ReplaySettings
-) -> Record:
+def record_of(agreement: RecordingAgreement) -> Record:
     """Prepare a recording: faulty samples marked, sensitivity of the readings to each initial value."""
     compared = [channel for channel in agreement.channels if channel.channel in SENSORS] or agreement.channels[:1]
-    noise, full_ranges = (
-        np.array([getattr(channel, name) for channel in compared]) for name in ("noise", "full_range")
-    )
-    good, wrong = np.ones((len(compared), len(measured.recording))), list[tuple[str, _Wrong]]()
+    noise = np.array([channel.noise for channel in compared])
+    good, words, has_few = np.ones((len(compared), len(agreement.measured))), list[str](), True
     for row, channel in enumerate(compared):
         values, residuals = channel.values, channel.residuals
         # Samples in a channel that the model explains are right, however they look; so are those of one that stands
         # still with the model, but for its zero.
         stands_still = np.ptp(values) == 0.0 and np.ptp(residuals) < channel.usual_zero
-        is_right = stands_still or channel.in_noise**2 < ONLY_NOISE
-        if not is_right and (fault := _wrong_samples(channel)) is not None:
-            wrong.append((channel.channel, fault))
-            good[row] -= fault.samples
-            is_good = np.logical_not(fault.samples)
-            noise[row] = max(noise_in(values[is_good], channel.full_range), correlated_noise_of(residuals[is_good]))
+        if stands_still or channel.in_noise**2 < ONLY_NOISE:
+            continue
+        said, is_wrong, is_isolated = _wrong_samples(channel, agreement.measured.time)
+        if said:
+            words.append(f"{channel.channel} {said}")
+            has_few = has_few and is_isolated and float(is_wrong.mean()) < _FEW_OUTLIERS
+            good[row] -= is_wrong
+            noise[row] = max(noise_in(values[~is_wrong], channel.full_range), correlated_noise_of(residuals[~is_wrong]))
     record = Record(
-        measured=measured,
+        agreement=agreement,
         channels=tuple(channel.channel for channel in compared),
         values=np.stack([channel.values for channel in compared]) / noise[:, None],
         noise=noise,
-        engine=ENGINE_ERROR * full_ranges / noise,
+        engine=ENGINE_ERROR * np.array([channel.full_range for channel in compared]) / noise,
         good=good,
-        words=tuple(f"{name} {fault.words}" for name, fault in wrong),
-        has_few=all(fault.is_isolated and float(fault.samples.mean()) < _FEW_OUTLIERS for _, fault in wrong),
-        delay=agreement.delay.correction,
+        words=tuple(words),
+        has_few=has_few,
     )
-    request, moved = replay_of(record.measured, device, settings), list[Replay]()
-    for name, error in zip(record.channels, noise / math.sqrt(samples_at_rest(measured.recording)), strict=True):
-        if name in SENSORS and name not in settings.initial:
+    request, starts = agreement.request, list[dict[str, float]]()
+    for name, error in zip(record.channels, noise / math.sqrt(samples_at_rest(agreement.measured)), strict=True):
+        if name in SENSORS and name not in request.settings.initial:
             # A vane at its upper stop can only move down.
-            is_at_stop = name == ANGLE and request.start.angle > device.actuator.angle_max - error
-            start = getattr(request.start, name) + float(-error if is_at_stop else error)
-            moved.append(replace(request, start=replace(request.start, **{name: start})))
+            is_at_stop = name == ANGLE and request.start.angle > request.device.actuator.angle_max - error
+            starts.append({name: getattr(request.start, name) + float(-error if is_at_stop else error)})
     if (error := request.start.velocity_error) > 0.0:
-        start = request.start.angular_velocity + error
-        moved.append(replace(request, start=replace(request.start, angular_velocity=start)))
-    unmoved, *others = replay_together([request, *moved])
+        starts.append({"angular_velocity": request.start.angular_velocity + error})
+    moved = [replace(request, start=replace(request.start, **start)) for start in starts]
+    unmoved, none = agreement.replayed, ModelChange()
     return record._replace(
         starts=tuple(
-            readings_of(record, other, ModelChange(), 0.0) - readings_of(record, unmoved, ModelChange(), 0.0)
-            for other in others
-            if isinstance(unmoved, Replayed) and isinstance(other, Replayed)
+            readings_of(record, other, none, 0.0) - readings_of(record, unmoved, none, 0.0)
+            for other in replay_together(moved)
+            if isinstance(other, Replayed)
         )
     )
 
 
-class _Wrong(NamedTuple):
-    """Faulty samples of a channel: description, flag by sample, and flag for isolated outliers."""
+def _wrong_samples(channel: ChannelAgreement, times: Floats) -> tuple[str, Flags, bool]:
+    """Return words on faulty samples, empty without any, their flags, and True for isolated outliers.
 
-    words: str
-    samples: Flags
-    is_isolated: bool = False
-
-
-def _wrong_samples(channel: ChannelAgreement) -> _Wrong | None:
-    """Return the faulty samples of a channel: constant signal, clipping, or outliers of samples or residuals."""
-    values = channel.values
+    Samples are clipped at the least or largest value if it is repeated more often than by chance. A coarse converter
+    repeats inner values too. Agreement of the other channels tells a stop of the vane from clipping.
+    """
+    values, count = channel.values, len(channel.values)
     if np.ptp(values) == 0.0:
         locked = argument_text("motion", "locked")
         other_cause = f"the vane was locked ({locked}), or " if channel.channel == ANGLE else ""
-        words = f"never changes: {other_cause}the sensor is dead or not connected"
-        return _Wrong(words, np.ones(len(values), dtype=bool))
-    if (clipped := _clipped_samples(values)) is not None:
-        return clipped
+        return f"never changes: {other_cause}the sensor is dead or not connected", np.ones(count, dtype=bool), False
+    run_ends = np.append(np.flatnonzero(np.diff(values)), count - 1)
+    lengths, levels = np.diff(run_ends, prepend=-1), values[run_ends]
+    ends = {"least": values.min(), "largest": values.max()}
+    inner = lengths[(levels > ends["least"]) & (levels < ends["largest"])]
+    # Chance that a sample repeats the one before it.
+    repeated = max(1.0 - len(inner) / max(int(inner.sum()), 1), 1.0 / count)
+    clipped = {
+        word: values == end
+        for word, end in ends.items()
+        if count * repeated ** (int(lengths[levels == end].max()) - 1) < _BY_CHANCE
+    }
+    if clipped:
+        counts = " and ".join(
+            f"{int(flags.sum())} samples are exactly its {word} value" for word, flags in clipped.items()
+        )
+        return f"is clipped: {counts}", np.any([*clipped.values()], axis=0), False
     is_out, is_out_on_flank = (isolated_samples(one, channel.noise) for one in (values, channel.residuals))
     # On a flank an outlier shows only beside a model that follows it; at the ends a delay makes one of a step.
     is_out[1:-1] |= is_out_on_flank[1:-1]
-    count = int(is_out.sum())
-    if not count:
-        return None
-    first = f"{float(channel.times[int(np.argmax(is_out))]):.6g} s"
-    words = f"has {count} isolated outlier{'s' * (count > 1)}, the first at {first}"
-    return _Wrong(words, is_out, is_isolated=True)
-
-
-def _clipped_samples(values: Floats) -> _Wrong | None:
-    """Return the samples at the least or largest value if repeated more often than by chance, else None.
-
-    A coarse converter repeats inner values too. Agreement of the other channels tells a stop of the vane from clipping.
-    """
-    run_ends = np.append(np.flatnonzero(np.diff(values)), len(values) - 1)
-    lengths, levels = np.diff(run_ends, prepend=-1), values[run_ends]
-    lowest, highest, count = levels.min(), levels.max(), len(values)
-    inner = lengths[(levels > lowest) & (levels < highest)]
-    # Chance that a sample repeats the one before it.
-    repeated = max(1.0 - len(inner) / max(int(inner.sum()), 1), 1.0 / count)
-    limits = [
-        (limit, word)
-        for limit, word in ((lowest, "least"), (highest, "largest"))
-        if count * repeated ** (int(lengths[levels == limit].max()) - 1) < _BY_CHANCE
-    ]
-    if not limits:
-        return None
-    counts = " and ".join(
-        f"{int((values == limit).sum())} samples are exactly its {word} value" for limit, word in limits
-    )
-    return _Wrong(f"is clipped: {counts}", np.isin(values, [limit for limit, _ in limits]))
-
-
-def starts_without_wrong(record: Record, device: Device, share: float) -> dict[str, float]:
-    """Return initial values [SI] of the channels with faulty first samples.
-
-    The value is the mean of the valid first samples, or else a fraction ``share`` [-] of the range of the channel.
-    """
-    actuator, supply, count = device.actuator, device.supply, samples_at_rest(record.measured.recording)
-    starts = {}
-    for name, values, good in zip(record.channels, record.values * record.noise[:, None], record.good, strict=True):
-        valid = values[:count][good[:count] > 0.0]
-        if name in SENSORS and len(valid) < count:
-            low, high = supply.atmospheric_pressure, max(supply.pressure, supply.dorsiflexion_pressure)
-            if name == ANGLE:
-                low, high = actuator.angle_min, actuator.angle_max
-            starts[name] = float(valid.mean()) if len(valid) else low + share * (high - low)
-    return starts
+    outliers = int(is_out.sum())
+    first = f"{float(times[int(np.argmax(is_out))]):.6g} s"
+    said = f"has {outliers} isolated outlier{'s' * (outliers > 1)}, the first at {first}"
+    return said if outliers else "", is_out, True
 
 
 def at_rate(recording: Recording, rate: float) -> Recording:
@@ -272,7 +225,7 @@ def at_rate(recording: Recording, rate: float) -> Recording:
 
 def readings_of(record: Record, replayed: Replayed, change: ModelChange, offset: float) -> Floats:
     """Return modelled readings divided by noise (channels, samples) under a change, delayed by ``offset`` [s]."""
-    time, model = record.measured.recording.time, replayed.recording
+    time, model = record.agreement.measured.time, replayed.recording
     true_time = time[0] + (time - time[0]) / change.clock
     rows = []
     for name in record.channels:
@@ -283,15 +236,15 @@ def readings_of(record: Record, replayed: Replayed, change: ModelChange, offset:
     return np.asarray(np.stack(rows) / record.noise[:, None])
 
 
-def residuals_of(record: Record, replayed: Replayed, change: ModelChange, longest_delay: float) -> ScaledResiduals:
-    """Return the residuals after fitting the common delay, at most ``longest_delay`` [s], and the initial values.
+def residuals_of(record: Record, replayed: Replayed, change: ModelChange) -> ScaledResiduals:
+    """Return the residuals after fitting the common delay, within its limit, and the initial values.
 
     The fit of the delay starts both from 0 and from the delay of the unchanged model, which a wrong model may distort.
     """
     good = np.ones_like(record.good) if change.start is None else record.good
     # No quantity stands twice in one fit: beside a delay of its own a change gets no free one, which would take a part.
-    longest_delay = 0.0 if change.has_delay else longest_delay
-    delays = {0.0, record.delay} if longest_delay > 0.0 else {0.0}
+    longest_delay = 0.0 if change.has_delay else record.agreement.request.settings.longest_delay
+    delays = {0.0, record.agreement.delay} if longest_delay > 0.0 else {0.0}
     options = [_errors_from(record, replayed, change, good, delay, longest_delay) for delay in delays]
     errors = min(options, key=lambda option: float(option @ option))
     squares = np.square(errors.reshape(good.shape)).sum(axis=1) / np.maximum(good.sum(axis=1), 1.0)
@@ -305,7 +258,7 @@ def _errors_from(
 
     Each step fits the delay and the initial values; these have a prior with a standard deviation of one standard error.
     """
-    interval = float(np.median(np.diff(record.measured.recording.time)))
+    interval = float(np.median(np.diff(record.agreement.measured.time)))
     delay = first_delay
     errors = np.zeros(good.size)
     for _ in range(STEPS + 1):

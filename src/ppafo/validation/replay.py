@@ -56,56 +56,48 @@ def replay_together(requests: Sequence[Replay]) -> list[Replayed | PpafoError]:
     Replays with the same program, clock and inputs are run in one batch.
     """
     ended: dict[int, Replayed | PpafoError] = {}
-    planned: dict[int, _Planned] = {}
-    alike: dict[Hashable, list[int]] = {}
+    alike: dict[Hashable, list[tuple[int, Run, StepInputs, Batch]]] = {}
     for number, request in enumerate(requests):
         try:
             recording = request.measured.recording
-            followed = followed_channels(request.measured, request.settings.motion)
+            followed = followed_channels(recording, request.settings.motion)
             run = _plan(request)
             inputs = step_inputs(RecordedInputs(recording, followed, float(recording.time[0])), request.device, run)
             batch = batch_of(run)
-            planned[number] = _Planned(request, run, inputs, batch)
         except PpafoError as error:
             ended[number] = error
             continue
         commands = [None if values is None else values.tobytes() for values in (inputs.command, inputs.earlier)]
         parameters = tuple((path, series.tobytes()) for path, series in inputs.parameters.items())
-        alike.setdefault((batch.program, batch.clock, *commands, parameters), []).append(number)
+        key = (batch.program, batch.clock, *commands, parameters)
+        alike.setdefault(key, []).append((number, run, inputs, batch))
     for together in alike.values():
-        first = planned[together[0]]
-        batch = replace(
-            first.batch,
-            parameters=np.concatenate([planned[number].batch.parameters for number in together], axis=1),
-            states=np.concatenate([planned[number].batch.states for number in together], axis=1),
+        numbers, runs, followed_inputs, batches = zip(*together, strict=True)
+        joint = replace(
+            batches[0],
+            parameters=np.concatenate([batch.parameters for batch in batches], axis=1),
+            states=np.concatenate([batch.states for batch in batches], axis=1),
         )
-        result, rows = replay(batch, first.inputs), state_row_numbers(first.run)
-        for lane, number in enumerate(together):
-            ended[number] = _replayed(planned[number], rows, result.record[:, :, lane], result.states[:, lane])
+        result, rows = replay(joint, followed_inputs[0]), state_row_numbers(runs[0])
+        for lane, (number, run) in enumerate(zip(numbers, runs, strict=True)):
+            record, ends = result.record[:, :, lane], result.states[:, lane]
+            ended[number] = _replayed(requests[number], run, rows, record, ends)
     return [ended[number] for number in range(len(requests))]
 
 
-@dataclass(frozen=True, slots=True)
-class _Planned:
-    """Replay ready to run: request, planned run, inputs of each step, and a batch with this run alone."""
-
-    request: Replay
-    run: Run
-    inputs: StepInputs
-    batch: Batch
-
-
-def _replayed(planned: _Planned, rows: Mapping[str, int], record: Floats, ends: Floats) -> Replayed | SimulationError:
+def _replayed(
+    request: Replay, run: Run, rows: Mapping[str, int], record: Floats, ends: Floats
+) -> Replayed | SimulationError:
     """Return a replay from its record (records, rows) and final state (rows,), or SimulationError if it diverged."""
-    request, run = planned.request, planned.run
+    recorded = request.measured.recording
     failure_time = float(ends[rows["result.failure_time"]])
     if failure_time < NEVER_FAILED or not np.isfinite(record).all():
         until = min(failure_time, run.step * run.step_count)
         why = f"; {TOO_MANY_PARTS}" if ends[rows["result.too_many_parts"]] else ""
         return SimulationError(f"{request.measured.file}: the model diverged {until:.6g} s after the first sample{why}")
-    recorded = request.measured.recording
-    angle = record[:, rows["state.angle"]]
-    mass_1, mass_2 = record[:, rows["state.mass_1"]], record[:, rows["state.mass_2"]]
+    angle, mass_1, mass_2, command = (
+        record[:, rows[path]] for path in ("state.angle", "state.mass_1", "state.mass_2", "result.command")
+    )
     pressure_1, pressure_2 = pressures_of(run.program.actuator, run.plant, angle, mass_1, mass_2)
     channels = {
         "angle": (angle, "rad"),
@@ -113,21 +105,21 @@ def _replayed(planned: _Planned, rows: Mapping[str, int], record: Floats, ends: 
         "pressure_2": (pressure_2, "Pa"),
         "pressure_difference": (np.subtract(pressure_1, pressure_2), "Pa_d"),
         "torque": (torque_of(run.program.actuator, run.plant, angle, pressure_1, pressure_2), "N m"),
-        "command": (record[:, rows["result.command"]], "-"),
+        "command": (command, "-"),
     }
     # Times are on the clock of the recording.
     interval = run.step * run.record_every
     times = recorded.time[0] + interval * np.arange(record.shape[0], dtype=np.float64)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
     model = Recording(f"{recorded.label}, replayed", times, values, kind="simulated")
-    return Replayed(model, run.step, followed_channels(request.measured, request.settings.motion))
+    return Replayed(model, run.step, followed_channels(recorded, request.settings.motion))
 
 
-def followed_channels(measured: MeasuredRecording, motion: Motion) -> tuple[str, ...]:
+def followed_channels(recording: Recording, motion: Motion) -> tuple[str, ...]:
     """Return the recorded channels used as inputs; external torque is an input of a free vane only."""
-    followed = [name for name in (SUPPLY, DORSIFLEXION_SUPPLY) if name in measured.recording]
-    followed += [EXTERNAL_TORQUE] if EXTERNAL_TORQUE in measured.recording and motion == "free" else []
-    return (COMMAND, *followed, *([ANGLE] if motion == "measured" else []))
+    names = (SUPPLY, DORSIFLEXION_SUPPLY, *([EXTERNAL_TORQUE] if motion == "free" else []))
+    angle = (ANGLE,) if motion == "measured" else ()
+    return (COMMAND, *(name for name in names if name in recording), *angle)
 
 
 def replayed_scenario(request: Replay) -> Scenario:

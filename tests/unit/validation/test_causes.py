@@ -21,7 +21,7 @@ from ppafo.validation.agreement import compare_recording
 from ppafo.validation.candidates import Cause, of_sensors
 from ppafo.validation.causes import CauseSearch, Diagnosis, causes_of
 from ppafo.validation.measured import check_recording
-from ppafo.validation.record import ModelChange, Record, record_of
+from ppafo.validation.record import ModelChange, record_of
 from ppafo.validation.settings import COMPARED, ReplaySettings
 from scripts.known_faults import FAULTS, LOOPS, Fault, declared_faults, judged, moved, recorded, validated
 
@@ -48,7 +48,7 @@ def bench() -> Recording:
 def causes(recording: Recording, device: Device | None = None, **settings: object) -> Diagnosis:
     used = device or load_device("ppafo2011", overrides=SUPPLY)
     measured, replays = check_recording(recording, used, "r.csv"), ReplaySettings(**settings)  # type: ignore[arg-type]
-    return causes_of([measured], [compare_recording(measured, used, replays)], used, replays)
+    return causes_of([compare_recording(measured, used, replays)])
 
 
 def with_channel(recording: Recording, name: str, values: np.ndarray) -> Recording:
@@ -393,7 +393,7 @@ def test_a_chamber_that_stands_still_is_within_its_limit_and_has_no_unit_misread
     settings = ReplaySettings(motion="locked")
     agreement = compare_recording(measured, device, settings)
     assert agreement.passes
-    found = causes_of([measured], [agreement], device, settings)
+    found = causes_of([agreement])
     assert found.found is None or found.found.is_usual
     assert found.nearest is None or "read as" not in found.nearest.name
 
@@ -401,7 +401,7 @@ def test_a_chamber_that_stands_still_is_within_its_limit_and_has_no_unit_misread
 def test_a_search_for_causes_reports_how_many_changes_are_done_of_how_many(bench: Recording) -> None:
     device, heard = load_device("ppafo2011", overrides=SUPPLY), list[Progress]()
     measured, settings = check_recording(swapped(bench), device, "r.csv"), ReplaySettings()
-    causes_of([measured], [compare_recording(measured, device, settings)], device, settings, heard.append)
+    causes_of([compare_recording(measured, device, settings)], heard.append)
     counted = [one for one in heard if one.activity == "searching for causes"]
     assert counted
     assert all(one.noun == "changes" and 0 <= one.done < one.total for one in counted)
@@ -479,7 +479,8 @@ def test_at_most_three_causes_that_leave_about_the_same_are_named(
     bench: Recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     device, settings = load_device("ppafo2011", overrides=SUPPLY), ReplaySettings()
-    search = CauseSearch(device, settings, [replay_record(bench, device, settings)], lambda _: None)
+    measured = check_recording(bench, device, "r.csv")
+    search = CauseSearch([record_of(compare_recording(measured, device, settings))], lambda _: None)
     left = {
         "rate of the clock": 9.95,
         "delay of angle": 8.0,
@@ -562,8 +563,3 @@ def test_a_common_delay_that_a_valve_may_have_is_in_the_verdict(bench: Recording
     )
     agreement = compare_recording(check_recording(bench, device, "r.csv"), load_device("ppafo2011"), settings)
     assert "was removed" not in verdict(Validation("ppafo2011", device, (), settings, (agreement,), Diagnosis()))
-
-
-def replay_record(recording: Recording, device: Device, settings: ReplaySettings) -> Record:
-    measured = check_recording(recording, device, "r.csv")
-    return record_of(measured, compare_recording(measured, device, settings), device, settings)
