@@ -5,12 +5,14 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, get_args
 
+import numpy as np
+
 from ppafo.arguments import checked
 from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import TomlKind, label, value_text
 from ppafo.errors import DataError, refused_as
 from ppafo.gait.gait import BODY_MASSES, CURVES, REQUIRED, SPEEDS, STATURES, Gait, GaitCurve, Origin, plain_unit
-from ppafo.gait.plausible import check_gait
+from ppafo.gait.plausible import MeanStride, check_plausible
 from ppafo.model.declaration import Number, Quantity
 from ppafo.parameters.declared import (
     SHORT_NAME,
@@ -114,7 +116,8 @@ def parse_gait(content: bytes, file: str) -> Gait:
     curves: dict[str, Any] = {name: _curve(document[name], name, place) for name in CURVES if name in document}
     gait = Gait(**texts, **numbers, strides=strides, **curves)  # type: ignore[arg-type]  # required numbers are there
     # A file that is well formed may still have a reversed sign or a wrong zero.
-    check_gait(gait, place)
+    series = {name: curve.values_at(np.linspace(0.0, 1.0, 101)) for name, curve in gait.curves.items()}
+    check_plausible(MeanStride(dict.fromkeys(series, place), series, gait.stance_share, gait.stride_time))
     return gait
 
 

@@ -3,7 +3,7 @@
 The figure shows the curves over the stride in the units of the field, with deviation band, events and single strides.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,23 +21,6 @@ from ppafo.units.shown import quantity_of_unit
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_PLAIN = (
-    "name",
-    "title",
-    "origin",
-    "source",
-    "notes",
-    "body_mass",
-    "stature",
-    "walking_speed",
-    "recorded_speed",
-    "stride_time",
-    "stride_time_deviation",
-    "stance_share",
-    "stance_share_deviation",
-    "strides",
-)
-"""Fields of a ``Gait`` that are written to JSON unchanged."""
 _STRIDE_KEYS = ("start", "toe_off", "end", "stance_share")
 
 _NOISE = 1e-9
@@ -58,7 +41,7 @@ class GaitFound:
         """Return numbers, curves and, after an import, strides as plain data in SI units."""
         gait, imported = self.gait, self.imported
         document: dict[str, Any] = {
-            **fields_of(gait, *_PLAIN),
+            **fields_of(gait, *(item.name for item in fields(Gait) if item.name not in CURVES)),
             "phases": PHASES.tolist(),
             "curves": {
                 name: {

@@ -100,13 +100,6 @@ class MeanStride:
         return f"{self.file[name]}: {name}"
 
 
-def check_gait(gait: Gait, file: str) -> None:
-    """Raise DataError for a gait file with an implausible stride, by the checks of ``check_plausible``."""
-    percent = np.linspace(0.0, 1.0, 101)
-    curves = {name: curve.values_at(percent) for name, curve in gait.curves.items()}
-    check_plausible(MeanStride(dict.fromkeys(curves, file), curves, gait.stance_share, gait.stride_time))
-
-
 def check_plausible(walk: MeanStride) -> None:
     """Raise DataError for an implausible mean stride; the message names file, curve, number and limits."""
     # A check in a chain is made only where those before it pass: a wrong unit would be refused again as a wrong sign.
@@ -435,24 +428,6 @@ almost as well as the given curves.
 """
 
 
-def _check_turning(walk: MeanStride) -> None:
-    """Raise DataError for a knee that turns about the resting ankle only after a correction."""
-    expected = turning_about_ankle(walk.curves["shank_angle"], walk.stride_time)
-    # Over a stride that repeats the mean is 0; gravity in it is refused elsewhere and must not hide a unit here.
-    forward, up = (walk.curves[name] - np.mean(walk.curves[name][:-1]) for name in KNEE)
-    turned = np.stack([forward, up])[:, FOOT_FLAT]
-    missed = _misfit(turned, expected)
-    for remedy, factors in _CORRECTIONS.items():
-        is_of_one_alone = factors[0][1] == factors[1][0] == 0.0 and factors[0][0] != factors[1][1]
-        left = _misfit(np.array(factors) @ turned, expected)
-        if left < min(_FITS, _LEFT_BY_ONE * missed) and not (walk.is_knee_one_marker and is_of_one_alone):
-            raise DataError(
-                f"{walk.where('knee_forward')} and knee_up differ by {100.0 * missed:.0f} % "
-                f"({100.0 * left:.0f} % if corrected) from a rotation of the knee about the resting ankle while the "
-                f"foot is flat; {remedy}"
-            )
-
-
 def turning_about_ankle(shank: Floats, stride_time: float) -> Floats:
     """Return the acceleration (2 x samples: forward, up) of a knee above a resting ankle, per shank length [1/s^2].
 
@@ -484,13 +459,29 @@ _PARTS = {"knee_forward": ((-0.3, 0.0), (0.3, 0.6)), "knee_up": ((0.0, 0.3), (0.
 
 
 def check_knee(walk: MeanStride) -> None:
-    """Raise DataError for knee accelerations that no leg can have; a stride without accelerations passes."""
+    """Raise DataError for knee accelerations that no leg can have, by size, sign and rotation about the resting ankle.
+
+    A stride without accelerations passes.
+    """
     there = [name for name in KNEE if name in walk.curves]
+    if not there:
+        return
     if len(there) == 1:
         (missing,) = set(KNEE) - set(there)
         raise DataError(f"{walk.where(there[0])} needs {missing}; give both or neither")
-    if there:
-        _check_turning(walk)
+    expected = turning_about_ankle(walk.curves["shank_angle"], walk.stride_time)
+    # Over a stride that repeats the mean is 0; gravity in it is refused elsewhere and must not hide a unit here.
+    turned = np.stack([walk.curves[name] - np.mean(walk.curves[name][:-1]) for name in KNEE])[:, FOOT_FLAT]
+    missed = _misfit(turned, expected)
+    for remedy, factors in _CORRECTIONS.items():
+        is_of_one_alone = factors[0][1] == factors[1][0] == 0.0 and factors[0][0] != factors[1][1]
+        left = _misfit(np.array(factors) @ turned, expected)
+        if left < min(_FITS, _LEFT_BY_ONE * missed) and not (walk.is_knee_one_marker and is_of_one_alone):
+            raise DataError(
+                f"{walk.where('knee_forward')} and knee_up differ by {100.0 * missed:.0f} % "
+                f"({100.0 * left:.0f} % if corrected) from a rotation of the knee about the resting ankle while the "
+                f"foot is flat; {remedy}"
+            )
     check_knee_means(walk)
     check_all([partial(_check_knee_curve, walk, name)] for name in there)
 

@@ -141,7 +141,9 @@ def _is_of_foot(start: float | None, end: float | None, plate: Signal, shank: Si
 def wrap_cycle(walk: Mapping[str, Signal]) -> tuple[dict[str, Signal], float, float] | None:
     """Return one cycle repeated three times, its period [s], and the misfit of its ends relative to the ranges [-].
 
-    None is returned if start and end of the record are not the same motion.
+    None is returned if start and end of the record are not the same motion. Where both ends overlap they are blended;
+    of a load the value of larger magnitude is used, because the other may be off the plate. A position advances by the
+    distance walked in each cycle.
     """
     start = max(walk[name].time[0] for name in REQUIRED)
     end = min(walk[name].time[-1] for name in REQUIRED)
@@ -166,35 +168,25 @@ def wrap_cycle(walk: Mapping[str, Signal]) -> tuple[dict[str, Signal], float, fl
     if misfits[best] > _MISFIT:
         return None
     period = float(shifts[best]) / _RATE
-    wrapped = {}
+    wrapped, turns = {}, np.arange(3)
     for name, signal in walk.items():
         slack = 1.0 / signal.rate
-        if signal.time[0] <= start + slack and signal.time[-1] >= start + period - slack:
-            wrapped[name] = _repeat(signal, start, float(end), period, name in LOADS)
+        if signal.time[0] > start + slack or signal.time[-1] < start + period - slack:
+            continue
+        count = max(2, round(period * signal.rate))
+        instants = start + period * np.arange(count) / count
+        values, later = (np.interp(instants + shift, signal.time, signal.values) for shift in (0.0, period))
+        overlap = min(float(end), float(signal.time[-1])) - start - period
+        inside = instants <= start + max(overlap, 0.0)
+        distance = float(np.mean((later - values)[inside])) if signal.is_position else 0.0
+        weight = np.clip((instants - start) / overlap, 0.0, 1.0) if overlap > 0.0 else np.ones(count)
+        blend = weight * values + (1.0 - weight) * (later - distance)
+        if name in LOADS:
+            blend = np.where(np.abs(later) > np.abs(values), later, values)
+        again = (turns[:, None] * period + instants[None, :]).ravel()
+        repeated = (turns[:, None] * distance + np.where(inside, blend, values)[None, :]).ravel()
+        wrapped[name] = replace(signal, time=again, values=repeated, columns=(), absent=None)
     return wrapped, period, float(misfits[best])
-
-
-def _repeat(signal: Signal, start: float, end: float, period: float, is_load: bool) -> Signal:
-    """Return three periods of the signal from ``start`` to ``end`` [s], blended where both ends overlap.
-
-    For a load, the overlap uses the value of larger magnitude, because the other may be off the plate. A position
-    advances by the distance walked in each cycle.
-    """
-    count = max(2, round(period * signal.rate))
-    instants = start + period * np.arange(count) / count
-    values, later = (np.interp(instants + shift, signal.time, signal.values) for shift in (0.0, period))
-    overlap = min(end, float(signal.time[-1])) - start - period
-    inside = instants <= start + max(overlap, 0.0)
-    # A position goes on by the distance walked in a cycle.
-    distance = float(np.mean((later - values)[inside])) if signal.is_position else 0.0
-    weight = np.clip((instants - start) / overlap, 0.0, 1.0) if overlap > 0.0 else np.ones(count)
-    blend = weight * values + (1.0 - weight) * (later - distance)
-    if is_load:
-        blend = np.where(np.abs(later) > np.abs(values), later, values)
-    turns = np.arange(3)
-    time = (turns[:, None] * period + instants[None, :]).ravel()
-    repeated = (turns[:, None] * distance + np.where(inside, blend, values)[None, :]).ravel()
-    return replace(signal, time=time, values=np.asarray(repeated, dtype=np.float64), columns=(), absent=None)
 
 
 @dataclass(frozen=True, slots=True)

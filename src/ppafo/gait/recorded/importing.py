@@ -40,7 +40,7 @@ from ppafo.gait.recorded.footfalls import (
     usable_strides,
 )
 from ppafo.gait.recorded.mapping import ImportSettings, check_settings, setting_text
-from ppafo.gait.recorded.signal import LOADS, Signal, check_direction, knee_remarks, low_pass
+from ppafo.gait.recorded.signal import LOADS, Signal, knee_remarks, low_pass
 from ppafo.gait.recorded.source import GaitSource, read_source
 from ppafo.gait.recorded.table import LONGEST_FILLED, MotionTable
 from ppafo.signals.recording import Floats
@@ -60,7 +60,8 @@ LARGEST_STRIDE_CHANGE = 0.25
 """Largest relative deviation from the median stride time; a larger one is a missed event or unsteady walking."""
 LONGEST_HELD = 0.1
 """Longest time [s] for which a column may be constant within the strides."""
-
+_FASTEST_BACK = 0.2
+"""Largest backward speed of a knee [m/s] on a treadmill, averaged over the recording."""
 _ABOUT_STANCE = 0.05
 """Interval at both ends of the stance [strides] in which a load may be constant too."""
 _COARSE = 0.001
@@ -191,14 +192,18 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     errors = {name: error for name, (_, error) in fitted.items()}
     walk = {name: footfalls.walk[name] for name in curves}
     most = f"at most {100.0 * REFUSED_SPREAD:.0f} % and {100.0 * REFUSED_MISFIT:.0f} % are accepted"
-    scattering = _scatters(curves, errors, REFUSED_SPREAD, REFUSED_MISFIT)
-    wrong += [DataError(f"{walk[name].file}: {message}; {most}") for name, message in scattering]
+    scattered = _scatters(curves, errors, REFUSED_SPREAD, REFUSED_MISFIT)
+    wrong += [DataError(f"{walk[name].file}: {message}; {most}") for name, message in scattered]
     with noted_in(wrong):
         # The ankle of the other foot looks like a wrong zero to the checks of the curves.
         check_side(mean_stride, load_gait())
         check_plausible(mean_stride)
-    with noted_in(wrong):
-        check_direction(walk)
+    if (way := walk.get("knee_forward")) is not None and way.is_position:
+        speed = float((way.values[-1] - way.values[0]) / (way.time[-1] - way.time[0]))
+        # On a treadmill the knee stays in about the same place.
+        if speed < -_FASTEST_BACK:
+            against = f"the knee moves backwards at {-speed:.2g} m/s, so knee.forward points against the"
+            wrong.append(DataError(f"{way.file}: {against} walking direction"))
     raise_noted(wrong)
     further = _remarks(source, footfalls.events, walk, curves, errors, strides)
     settings, names = source.settings, ", ".join(Path(table.file).name for table in source.tables)
@@ -241,13 +246,24 @@ def _curves_over_strides(
 ) -> tuple[dict[str, CurveStatistics], StrideSelection, list[str]]:
     """Return the curves over the selected strides, the selection, and a remark on each load without a measured stance.
 
-    Problems are added to ``wrong``. Raises DataError, with all of them, without strides or without an angle.
+    A stride is rejected if its duration differs from the median by more than LARGEST_STRIDE_CHANGE, or if it has lost
+    samples. Problems are added to ``wrong``. Raises DataError, with all of them, without strides or without an angle.
     """
     cut_off, recorded = source.settings.low_pass, footfalls.walk
-    usable = select_strides(footfalls, source.settings.least_strides)
-    with noted_in(wrong):
-        check_enough(usable, footfalls)
-    if not usable.taken:
+    least = source.settings.least_strides or (1 if footfalls.is_one_cycle or footfalls.is_overground else LEAST_STRIDES)
+    whole = usable_strides(recorded, footfalls.strides)
+    # The median: one stop among ten strides would move a mean.
+    median = float(np.median([stride.time for stride in whole])) if whole else 0.0
+    kept = [stride for stride in whole if abs(stride.time - median) <= LARGEST_STRIDE_CHANGE * median]
+    usual = f"{np.mean([stride.time for stride in kept]):.3g} s" if kept else ""
+    odd = [stride for stride in whole if stride not in kept]
+    unusual = [(stride, f"{stride.time:.3g} s long, the others are about {usual}") for stride in odd]
+    counts = [(stride, max(lost_in(recorded[name], stride) for name in REQUIRED)) for stride in footfalls.strides]
+    lost = [(stride, f"markers or angles lost in {count_of(count, 'frame')}") for stride, count in counts if count]
+    usable = StrideSelection(tuple(kept), (*unusual, *lost), least)
+    if len(kept) < least:
+        wrong.append(DataError(_too_few(usable, footfalls)))
+    if not kept:
         raise_noted(wrong)
     covered = {name: strides_of_curve(footfalls, name, signal, usable.taken) for name, signal in recorded.items()}
     # A load that no plate measured for a whole stance would otherwise be refused as one whose file is too short.
@@ -282,33 +298,10 @@ def _curves_over_strides(
     return remaining, strides, remarks
 
 
-def select_strides(footfalls: Footfalls, given_least: int | None) -> StrideSelection:
-    """Return the strides with both angles whose duration differs from the median by at most LARGEST_STRIDE_CHANGE.
-
-    Strides with lost samples are rejected too. ``given_least`` is the least number of strides, None for the default.
-    """
-    walk = footfalls.walk
-    least = given_least or (1 if footfalls.is_one_cycle or footfalls.is_overground else LEAST_STRIDES)
-    recorded = usable_strides(walk, footfalls.strides)
-    # The median: one stop among ten strides would move a mean.
-    median = float(np.median([stride.time for stride in recorded])) if recorded else 0.0
-    kept = [stride for stride in recorded if abs(stride.time - median) <= LARGEST_STRIDE_CHANGE * median]
-    usual = f"{np.mean([stride.time for stride in kept]):.3g} s" if kept else ""
-    odd = [stride for stride in recorded if stride not in kept]
-    unusual = [(stride, f"{stride.time:.3g} s long, the others are about {usual}") for stride in odd]
-    counts = [(stride, max(lost_in(walk[name], stride) for name in REQUIRED)) for stride in footfalls.strides]
-    lost = [(stride, f"markers or angles lost in {count_of(count, 'frame')}") for stride, count in counts if count]
-    return StrideSelection(tuple(kept), (*unusual, *lost), least)
-
-
-def check_enough(strides: StrideSelection, footfalls: Footfalls) -> None:
-    """Raise DataError for too few strides, with the cause: events, covered time or gaps."""
-    taken, least = len(strides.taken), strides.least
-    if taken >= least:
-        return
+def _too_few(strides: StrideSelection, footfalls: Footfalls) -> str:
+    """Return the message on too few strides, with the cause: events, covered time or gaps."""
     walk = {name: footfalls.walk[name] for name in (*REQUIRED, footfalls.events) if name in footfalls.walk}
     spans = ", ".join(f"{name} {signal.time[0]:.4g} to {signal.time[-1]:.4g} s" for name, signal in walk.items())
-    count = count_of(taken, "whole stride")
     events = f"{count_of(len(footfalls.strides), 'stride')} in the events"
     if not footfalls.strides:
         where = FORCE if FORCE in walk else SHANK
@@ -318,9 +311,10 @@ def check_enough(strides: StrideSelection, footfalls: Footfalls) -> None:
         0.0 if signal.lost is None else float(np.max(np.diff(signal.time[~signal.lost]))) for signal in walk.values()
     )
     gap = f"; the longest gap is {longest:.3g} s, and {setting_text('longest_gap')} fills up to {LONGEST_FILLED:g} s"
-    raise DataError(
-        f"{walk['shank_angle'].file}: has {count} covered by both angles and events ({events}; {spans}), but "
-        f"{setting_text('least_strides')} is {least}{gap if longest > 0.0 else ''}"
+    return (
+        f"{walk['shank_angle'].file}: has {count_of(len(strides.taken), 'whole stride')} covered by both angles and "
+        f"events ({events}; {spans}), but {setting_text('least_strides')} is {strides.least}"
+        f"{gap if longest > 0.0 else ''}"
     )
 
 

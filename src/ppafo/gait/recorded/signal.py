@@ -35,8 +35,6 @@ _LENGTHS = (0.2, 0.7)
 """Plausible lengths of a thigh [m]."""
 _HIP_HEIGHT = 0.3
 """Depth of the hip below the origin [m] above which the sign is wrong; laboratories have no origin above the hip."""
-_FASTEST_BACK = 0.2
-"""Largest backward speed [m/s] on a treadmill, averaged over the recording."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -262,19 +260,6 @@ def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: fl
             f"acceleration of the knee from a Fourier series of its position, {HARMONICS['knee_forward']} harmonics"
         )
     return remarks
-
-
-def check_direction(walk: Mapping[str, Signal]) -> None:
-    """Raise DataError for a knee that moves backwards; on a treadmill, the knee stays in about the same place."""
-    knee = walk.get("knee_forward")
-    if knee is None or not knee.is_position:
-        return
-    speed = float((knee.values[-1] - knee.values[0]) / (knee.time[-1] - knee.time[0]))
-    if speed < -_FASTEST_BACK:
-        raise DataError(
-            f"{knee.file}: the knee moves backwards at {-speed:.2g} m/s, so knee.forward points against the "
-            "walking direction"
-        )
 
 
 def knee_position(hip_forward: Floats, hip_up: Floats, lean: Floats, thigh_length: float) -> tuple[Floats, Floats]:

@@ -386,8 +386,22 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
         remarks.append(f"not in the gait map, read as the {settings.side} foot by the file format: {shown}")
     if not is_usable:
         raise_noted(wrong)
-    walk, on_plates = _with_loads(walk, tables, convention, settings.body_mass, wrong)
-    remarks += [*on_plates, *convention.remarks, *(remark for _, remark in convention.curve_remarks)]
+    # Loads of unknown body mass, and a force of a wrong scale, get a largest value of 1: their events are still found.
+    if settings.body_mass is None:
+        walk |= {name: of_largest_one(walk[name]) for name in ("ankle_moment", FORCE) if name in walk}
+    elif convention.plates and FORCE not in walk:
+        # Without a force in the files, the plates that this foot steps on give it.
+        with noted_in(wrong):
+            force, on_plates = force_of_plates(tables, convention.plates, walk["shank_angle"], body_mass)
+            walk |= {} if force is None else {FORCE: force}
+            remarks += on_plates
+    if FORCE in walk:
+        try:
+            check_force_scale(walk[FORCE].file, walk[FORCE].values)
+        except DataError as error:
+            wrong.append(error)
+            walk[FORCE] = of_largest_one(walk[FORCE], is_upwards=True)
+    remarks += [*convention.remarks, *(remark for _, remark in convention.curve_remarks)]
     remarks += [f"{Path(table.file).name}: {remark}" for table in tables for remark in table.remarks]
     return GaitSource(tables, columns, walk, settings, (*remarks, *_ends(walk, tables)))
 
@@ -430,34 +444,6 @@ def _read_tables(
         units = {**found.units, **{name: table.units[name] for name in kept}}
         arranged.append(replace(found, columns=columns, units=units))
     return arranged
-
-
-def _with_loads(
-    walk: dict[str, Signal],
-    tables: Sequence[MotionTable],
-    convention: Convention,
-    body_mass: float | None,
-    wrong: list[PpafoError],
-) -> tuple[dict[str, Signal], list[str]]:
-    """Return the signals with loads of a known scale, and remarks on the force plates.
-
-    Without a force in the files, the plates that this foot steps on give the force. Loads of unknown body mass,
-    and a force of a wrong scale, which is added to ``wrong``, get a largest value of 1: their events are still found.
-    """
-    remarks: list[str] = []
-    if body_mass is None:
-        walk |= {name: of_largest_one(walk[name]) for name in ("ankle_moment", FORCE) if name in walk}
-    elif convention.plates and FORCE not in walk:
-        with noted_in(wrong):
-            force, remarks = force_of_plates(tables, convention.plates, walk["shank_angle"], body_mass)
-            walk |= {} if force is None else {FORCE: force}
-    if FORCE in walk:
-        try:
-            check_force_scale(walk[FORCE].file, walk[FORCE].values)
-        except DataError as error:
-            wrong.append(error)
-            walk[FORCE] = of_largest_one(walk[FORCE], is_upwards=True)
-    return walk, remarks
 
 
 def of_largest_one(signal: Signal, is_upwards: bool = False) -> Signal:

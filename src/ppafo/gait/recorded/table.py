@@ -166,12 +166,13 @@ def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTabl
             continue
         at = np.array([columns[name] for name in own]) * metres_in(table, own[0])
         recorded, zero = np.isfinite(at).all(axis=0), (at == 0.0).all(axis=0)
+        steps = np.abs(np.diff(at, axis=1))
+        is_coarse = steps.any() and float(np.min(steps, initial=np.inf, where=steps > 0.0)) > _COARSE
         causes = {
             "not recorded": ~recorded,
             # A marker that is 0 throughout stands at the origin.
             "all coordinates 0": zero & bool((recorded & ~zero).any()),
-            "position unchanged": ~zero
-            & _held(at, MOST_ACCELERATION * interval**2 if _resolution(at) > _COARSE else 0.0),
+            "position unchanged": ~zero & _held(at, MOST_ACCELERATION * interval**2 if is_coarse else 0.0),
         }
         lost = {cause: frames for cause, frames in causes.items() if frames.any()}
         if not lost:
@@ -199,12 +200,6 @@ def _held(at: Floats, furthest: float) -> NDArray[np.bool_]:
         if after - before > 2 and (after == steps.size or steps[after] > furthest):
             held[before + 2 : after + 1] = True
     return held
-
-
-def _resolution(at: Floats) -> float:
-    """Return the smallest step between frames of the coordinates of a marker [m]; 0 if it never moves."""
-    steps = np.abs(np.diff(at, axis=1))
-    return float(np.min(steps, initial=np.inf, where=steps > 0.0)) if steps.any() else 0.0
 
 
 def fill_gaps(table: MotionTable, names: Iterable[str], longest: float) -> MotionTable:

@@ -76,7 +76,19 @@ def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Conve
     else:
         column = f"{angles or foot.upper() + 'AnkleAngles'}.x"
         angle = AngleMap(terms=(column,), positive="dorsiflexion", unit="deg")
-    loads, units = _load_maps(table, labels, foot, vertical if shin else "", body_mass)
+    # The measured loads, each in the unit that its magnitude shows. Without the axis upwards there is no force.
+    loads, on_loads = dict[str, Any](), list[tuple[str, str]]()
+    moment = _label(labels, foot + _MOMENTS)
+    if moment is not None and _is_measured(table, f"{moment}.x"):
+        unit, said = load_unit(table, f"{moment}.x", "moment", body_mass)
+        loads["ankle_moment"] = MomentMap(terms=(f"{moment}.x",), positive="plantarflexion", unit=unit)
+        on_loads += [("ankle_moment", remark) for remark in said]
+    reactions = [f"{name}.{vertical}" for each in _REACTIONS if shin and (name := _label(labels, foot + each))]
+    force = next((name for name in reactions if _is_measured(table, name)), None)
+    if force is not None:
+        unit, said = load_unit(table, force, "force", body_mass)
+        loads["vertical_force"] = ForceMap(terms=(force,), unit=unit or "-")
+        on_loads += [("vertical_force", remark) for remark in said]
     columns = GaitMap(
         shank_angle=ShankMap(knee=knee, ankle=ankle, forward=forward, vertical=vertical),
         ankle_angle=angle,
@@ -84,7 +96,7 @@ def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Conve
         **loads,
     )
     plates = tuple(name for name in table.columns if name.startswith(PLATE) and name.endswith(f".{vertical}"))
-    return Convention(columns, plates, remarks, tuple(units))
+    return Convention(columns, plates, remarks, tuple(on_loads))
 
 
 def convention_of_map(columns: GaitMap, tables: Sequence[MotionTable], side: Side) -> Convention:
@@ -159,32 +171,6 @@ def _label(labels: Sequence[str], pattern: str) -> str | None:
 def _first(labels: Sequence[str], foot: str, names: Sequence[str]) -> str | None:
     """Return the label of a foot's marker by the first usual name that is present, or None."""
     return next(filter(None, (_label(labels, foot + name) for name in names)), None)
-
-
-def _load_maps(
-    table: MotionTable, labels: Sequence[str], foot: str, vertical: str, body_mass: float
-) -> tuple[dict[str, Any], list[tuple[str, str]]]:
-    """Return the maps of the measured loads, each with the unit inferred from its magnitude, and remarks on curves.
-
-    There is no force if ``vertical``, the axis upwards, is unknown (empty).
-    """
-    maps: dict[str, Any] = {}
-    remarks: list[tuple[str, str]] = []
-    moment = _label(labels, foot + _MOMENTS)
-    if moment is not None and _is_measured(table, f"{moment}.x"):
-        unit, load_remarks = load_unit(table, f"{moment}.x", "moment", body_mass)
-        maps["ankle_moment"] = MomentMap(terms=(f"{moment}.x",), positive="plantarflexion", unit=unit)
-        remarks += [("ankle_moment", remark) for remark in load_remarks]
-    reactions = (_label(labels, foot + name) for name in _REACTIONS)
-    force = next(
-        (f"{name}.{vertical}" for name in reactions if name and vertical and _is_measured(table, f"{name}.{vertical}")),
-        None,
-    )
-    if force is not None:
-        unit, load_remarks = load_unit(table, force, "force", body_mass)
-        maps["vertical_force"] = ForceMap(terms=(force,), unit=unit or "-")
-        remarks += [("vertical_force", remark) for remark in load_remarks]
-    return maps, remarks
 
 
 def _is_measured(table: MotionTable, name: str) -> bool:

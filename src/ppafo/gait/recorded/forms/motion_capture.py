@@ -8,7 +8,6 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -50,16 +49,6 @@ def _rate_in(path: str | Path, cell: str, line: int) -> float:
     return rate
 
 
-class _NexusBlock(NamedTuple):
-    """Block of a Nexus export: rate [Hz], label, axis and unit of every column, and the rows of numbers."""
-
-    rate: float
-    labels: list[str]
-    axes: list[str]
-    units: list[str]
-    rows: NumberBlock
-
-
 def _read_nexus(path: str | Path) -> MotionTable:
     """Return markers, model outputs and force plates of a Vicon Nexus CSV export.
 
@@ -73,14 +62,11 @@ def _read_nexus(path: str | Path) -> MotionTable:
         if _head_of(line) in (*_NEXUS_MOTION, _NEXUS_DEVICES)
     ]
     motions = []
-    for block in (block for kind, block in blocks if kind != _NEXUS_DEVICES):
+    for rate, columns, units, rows in (block for kind, block in blocks if kind != _NEXUS_DEVICES):
         # Velocities and accelerations, X' and X'', are not read.
-        names = [
-            f"{bare_label(label)}.{axis.lower()}" if label and axis.lower() in AXES else ""
-            for label, axis in zip(block.labels, block.axes, strict=True)
-        ]
+        names = [f"{bare_label(label)}.{axis}" if label and axis in AXES else "" for label, axis in columns]
         names[0] = "Frame"
-        motions.append(table_of(path, block.rows, names, block.units, "Frame", frame_rate=block.rate, noun="markers"))
+        motions.append(table_of(path, rows, names, units, "Frame", frame_rate=rate, noun="markers"))
     if not motions:
         raise DataError(f"{path}: has no block 'Trajectories' or 'Model Outputs'")
     whole = motions[0]
@@ -98,12 +84,16 @@ def _joined(table: MotionTable, columns: Mapping[str, Floats], units: Mapping[st
     return replace(table, columns={**columns, **table.columns}, units={**units, **table.units})
 
 
+_NexusBlock = tuple[float, list[tuple[str, str]], list[str], NumberBlock]
+"""Rate [Hz] of a block, label and axis in lower case of every column, their units, and the rows of numbers."""
+
+
 def _nexus_block(path: str | Path, lines: Sequence[str], start: int) -> _NexusBlock:
     """Return the block whose title is on line ``start``; raises DataError for an invalid header."""
     head = lines[start + 1 : start + 5]
     delimiter = delimiter_of(head[2]) if len(head) == 4 else ","
-    axes = cells_of(head[2], delimiter) if len(head) == 4 else []
-    if [axis.lower() for axis in axes[:2]] != ["frame", "sub frame"]:
+    axes = [axis.lower() for axis in cells_of(head[2], delimiter)] if len(head) == 4 else []
+    if axes[:2] != ["frame", "sub frame"]:
         raise DataError(f"{path}: line {start + 4}: must begin with 'Frame' and 'Sub Frame'")
     labels, last = [], ""
     written = cells_of(head[1], delimiter)
@@ -114,25 +104,23 @@ def _nexus_block(path: str | Path, lines: Sequence[str], start: int) -> _NexusBl
     units = [*cells_of(head[3], delimiter), *[""] * len(axes)][: len(axes)]
     rate = _rate_in(path, cells_of(head[0], delimiter)[0], start + 2)
     end = next((n for n in range(start + 5, len(lines)) if not lines[n].strip(",;\t ")), len(lines))
-    rows = NumberBlock(lines[:end], start + 5, delimiter)
-    return _NexusBlock(rate=rate, labels=labels, axes=axes, units=units, rows=rows)
+    return rate, list(zip(labels, axes, strict=True)), units, NumberBlock(lines[:end], start + 5, delimiter)
 
 
 def _nexus_forces(path: str | Path, block: _NexusBlock, time: Floats) -> dict[str, Floats]:
     """Return the plate forces [N] at the times of the frames [s], positive upwards, by ``force plate 1.x``."""
-    plates = list(dict.fromkeys(label for label in block.labels if label.lower().endswith("force")))
+    rate, columns, _, rows = block
+    plates = list(dict.fromkeys(label for label, _ in columns if label.lower().endswith("force")))
     names = [
-        f"{PLATE}{plates.index(label) + 1}.{axis[1].lower()}"
-        if label in plates and axis.lower() in ("fx", "fy", "fz")
-        else ""
-        for label, axis in zip(block.labels, block.axes, strict=True)
+        f"{PLATE}{plates.index(label) + 1}.{axis[1]}" if label in plates and axis in ("fx", "fy", "fz") else ""
+        for label, axis in columns
     ]
     if not any(names):
         return {}
     with refused_as(DataError, path, DataError):
-        values, _ = rows_of(block.rows, names)
+        values, _ = rows_of(rows, names)
     # Devices are sampled faster than markers, from the same first frame.
-    at = np.clip(np.rint((time - time[0]) * block.rate).astype(np.int64), 0, len(values) - 1)
+    at = np.clip(np.rint((time - time[0]) * rate).astype(np.int64), 0, len(values) - 1)
     forces = dict(zip((name for name in names if name), values[at].T, strict=True))
     for number in range(1, len(plates) + 1):
         own = {name: force for name, force in forces.items() if name.startswith(f"{PLATE}{number}.")}

@@ -8,7 +8,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -53,15 +52,6 @@ def _read(path: str | Path) -> MotionTable:
     return replace(plain, units={name: unit or unit_of_label(name, name, "") for name, unit in plain.units.items()})
 
 
-class _Header(NamedTuple):
-    """Header of an OpenSim table: counts by key in lower case, unit of angles, kind of the recording, last line."""
-
-    counts: dict[str, int]
-    angle: str
-    kind: str
-    end: int
-
-
 def read_opensim(path: str | Path) -> MotionTable:
     """Return the table of a ``.mot`` or ``.sto`` file. Raises DataError with file, line and column of an error.
 
@@ -70,8 +60,8 @@ def read_opensim(path: str | Path) -> MotionTable:
     """
     lines = tabbed_lines(path)
     with refused_as(DataError, path, DataError):
-        header = _header(lines)
-        at = next((number for number in range(header.end + 1, len(lines)) if lines[number].strip()), None)
+        counts, angle, kind, end = _header(lines)
+        at = next((number for number in range(end + 1, len(lines)) if lines[number].strip()), None)
         if at is None:
             raise DataError(f"has nothing after '{END}': the file is cut off")
         # Labels may hold blanks where tabs separate them.
@@ -82,10 +72,10 @@ def read_opensim(path: str | Path) -> MotionTable:
         if "" in labels:
             raise DataError(f"line {at + 1}: column {labels.index('') + 1} has no name")
         rows, remarks = _rows(lines, at + 1, len(labels)), list[str]()
-        stated = header.counts.get("nrows", header.counts.get("datarows", len(rows)))
+        stated = counts.get("nrows", counts.get("datarows", len(rows)))
         if stated != len(rows):
             raise DataError(f"has {len(rows)} rows, but the header states {stated}: the file is cut off or was edited")
-    count = header.counts.get("ncolumns", header.counts.get("datacolumns", len(labels)))
+    count = counts.get("ncolumns", counts.get("datacolumns", len(labels)))
     if count != len(labels):
         remarks.append(f"the header states {count} columns, but labels and rows have {len(labels)}, which were read")
     # Some tools repeat the last time.
@@ -95,10 +85,10 @@ def read_opensim(path: str | Path) -> MotionTable:
     if kept < len(rows):
         remarks.append(f"{len(rows) - kept} of the last rows repeat the time {_time_of(rows[-1])} s and were dropped")
     block = NumberBlock(lines[: at + 1 + kept], at + 1, None, is_ragged=False)
-    table = table_of(path, block, labels, [""] * len(labels), labels[0], kind=header.kind)
+    table = table_of(path, block, labels, [""] * len(labels), labels[0], kind=kind)
     # The older style of SIMM has its angles in degrees.
-    is_unstated = not header.angle and "datacolumns" in header.counts
-    angle = "deg" if is_unstated else header.angle
+    is_unstated = not angle and "datacolumns" in counts
+    angle = "deg" if is_unstated else angle
     paths = {match[1]: name for name in table.columns if (match := _STATE.fullmatch(name))}
     columns = {**table.columns, **{name: table.columns[path] for name, path in paths.items()}}
     units = {name: unit_of_label(paths.get(name, name), name, angle) for name in columns}
@@ -127,8 +117,8 @@ def _time_of(row: str) -> float | str:
     return cell if time is None else time
 
 
-def _header(lines: Sequence[str]) -> _Header:
-    """Parse the header, up to ``endheader``. Raises DataError with the line of an error."""
+def _header(lines: Sequence[str]) -> tuple[dict[str, int], str, str, int]:
+    """Return counts by key in lower case, unit of angles, kind and last line of a header. Raises DataError."""
     end = next((index for index, line in enumerate(lines) if line.strip().lower() == END), None)
     if end is None:
         raise DataError(f"has no line '{END}': the header is cut off, or this is not a .mot or .sto file")
@@ -148,7 +138,7 @@ def _header(lines: Sequence[str]) -> _Header:
                 raise DataError(f"line {number}: the header states both degrees and radians")
             angle = unit
         kind = kind or next((known for known in ("simulated", "synthetic") if line == f"{KIND}{known}"), "")
-    return _Header(counts, angle, kind or "measured", end)
+    return counts, angle, kind or "measured", end
 
 
 def unit_of_label(path: str, label: str, angle: str) -> str:
@@ -170,30 +160,28 @@ _SIDES = {"right": {"r", "right"}, "left": {"l", "left"}}
 def opensim_convention(table: MotionTable, side: Side, _body_mass: float) -> Convention:
     """Return the map of OpenSim's labels; a force plate known only by number belongs to the foot that moves with it.
 
-    As in OpenSim's gait models, the ankle is positive in dorsiflexion. The lean of the shank is the sum of pelvis tilt,
-    hip and knee flexion in the sagittal plane, that of the thigh of the first two, with the hip at the pelvis.
+    In OpenSim's gait models the knee is negative in flexion as in gait2392, the ankle positive in dorsiflexion. The
+    shank angle is the sum of pelvis tilt, hip flexion and knee flexion in the sagittal plane. The lean of the thigh is
+    computed in the same way, with the hip at the origin of the pelvis.
     """
-    foot, terms = side[0], list[str]()
-    for name in ("pelvis_tilt", f"hip_flexion_{foot}", f"knee_angle_{foot}"):
+    foot, terms = side[0], []
+    for name in ("pelvis_tilt", f"hip_flexion_{foot}", f"{_KNEE}{foot}"):
         flexion = table.columns.get(name) if name.startswith(_KNEE) else None
         # Where its flexion counts above 0, as in the newer OpenSim models, the knee is subtracted.
         counts_above = flexion is not None and bool(np.nanmax(flexion) > -np.nanmin(flexion))
         terms.append(f"-{name}" if counts_above else name)
+    # Columns that this package adds to the coordinates of OpenSim (``storage/opensim.py``) are read as they are.
+    own_shank, own_knee = f"shank_angle_{foot}", {"knee_forward", "knee_up"} <= set(table.columns)
+    has_pressure = "centre_of_pressure" in table.columns
     usual = GaitMap(
-        shank_angle=ShankMap(terms=tuple(terms)),
+        shank_angle=ShankMap(terms=(own_shank,) if own_shank in table.columns else tuple(terms)),
         ankle_angle=AngleMap(terms=(f"ankle_angle_{foot}",), positive="dorsiflexion"),
         ankle_moment=MomentMap(terms=(f"ankle_angle_{foot}_moment",), positive="dorsiflexion"),
-        knee=KneeMap(forward=("pelvis_tx",), up=("pelvis_ty",), thigh=("pelvis_tilt", f"hip_flexion_{foot}")),
+        centre_of_pressure=PressureMap(terms=("centre_of_pressure",), unit="m") if has_pressure else None,
+        knee=KneeMap(forward=("knee_forward",), up=("knee_up",), unit="m/s^2")
+        if own_knee
+        else KneeMap(forward=("pelvis_tx",), up=("pelvis_ty",), thigh=("pelvis_tilt", f"hip_flexion_{foot}")),
     )
-    maps: dict[str, Any] = {}
-    # Columns that this package adds to the coordinates of OpenSim (``storage/opensim.py``) are read as they are.
-    if f"shank_angle_{foot}" in table.columns:
-        maps["shank_angle"] = ShankMap(terms=(f"shank_angle_{foot}",))
-    if {"knee_forward", "knee_up"} <= set(table.columns):
-        maps["knee"] = KneeMap(forward=("knee_forward",), up=("knee_up",), unit="m/s^2")
-    if "centre_of_pressure" in table.columns:
-        maps["centre_of_pressure"] = PressureMap(terms=("centre_of_pressure",), unit="m")
-    usual = replace(usual, **maps)
     # Columns of vertical force that name this foot, the other foot, or none.
     forces: tuple[list[str], list[str], list[str]] = ([], [], [])
     own, other, numbered = forces
@@ -210,7 +198,7 @@ def opensim_convention(table: MotionTable, side: Side, _body_mass: float) -> Con
         return Convention(replace(usual, vertical_force=ForceMap(terms=plates)), curve_remarks=remarks)
     if len(numbered) == 1 and side == "right":
         return Convention(replace(usual, vertical_force=ForceMap(terms=tuple(numbered))))
-    return Convention(replace(usual, vertical_force=None), tuple(numbered))
+    return Convention(usual, tuple(numbered))
 
 
 _ALONG = np.radians(5.0)
