@@ -3,6 +3,7 @@
 The extensive code of walks is only loaded on request.
 """
 
+import re
 import shlex
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -11,7 +12,7 @@ from typing import Any
 
 from ppafo.arguments import Overrides, checked
 from ppafo.documents.toml_text import assignments, beside, label, table_lines
-from ppafo.errors import ScenarioError
+from ppafo.errors import ScenarioError, StudyError
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.declared import kind_at, schema_of
 from ppafo.parameters.loading import set_or_load
@@ -25,6 +26,8 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.wording import known_names
 
 _OF_WALKS = {"gait", "wearer", "bottle"}
+_SETTING = re.compile(r"\s*controller\.(?!rate|period)")
+"""Settings of a law: an object in its place ignores them, except rate and period, at which it is called."""
 _IN_FILE = "# or in the file of a scenario, in place of the tables of these names"
 
 
@@ -149,6 +152,27 @@ def reloaded(scenario: Scenario, more: Iterable[str]) -> Scenario:
     )
     read = of_vanes.scenario_of(replace(before, overrides=every), layout)
     return read if custom is None else read.controlled_by(custom)
+
+
+def with_overrides(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
+    """Apply overrides to a scenario; StudyError if the scenario was changed in Python, which reloading would undo.
+
+    A Python object that controls the scenario is kept.
+    """
+    changes = tuple(overrides)
+    if not changes:
+        return scenario
+    of_object = [text for text in changes if scenario.controller.custom is not None and _SETTING.match(text)]
+    if of_object:
+        raise StudyError(
+            f"override '{of_object[0]}': scenario '{scenario.name}' has a Python controller; set the value in it"
+        )
+    # Overrides begin at what the file said, so what was replaced in Python would silently come back.
+    if reloaded(scenario, ()) != scenario:
+        raise StudyError(
+            f"scenario '{scenario.name}' was changed in Python, which overrides would undo; load it with the overrides"
+        )
+    return reloaded(scenario, changes)
 
 
 def usage_text(scenario: Scenario) -> str:

@@ -13,9 +13,9 @@ from ppafo import plugins
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import KindError, ParameterError, ScenarioError
+from ppafo.loading import with_overrides
 from ppafo.metrics import METRICS
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
-from ppafo.studies.study import with_overrides
 
 LAW = """
 from dataclasses import replace

@@ -1,7 +1,7 @@
 """Vocabulary of the questions: what they take from the packages below, by one import."""
 
 from ppafo.arguments.values import taken_tasks
-from ppafo.loading import scenario_or_load
+from ppafo.loading import scenario_or_load, with_overrides
 from ppafo.metrics import METRICS, Metric
 from ppafo.metrics.tracking import TRACKING
 from ppafo.parameters.overrides import over
@@ -25,15 +25,13 @@ from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import FEWEST_DRAWS, MAXIMUM_DRAWS, REPLICATES, Uncertainty, seeds_of_noise, uncertainty_of
 from ppafo.studies.intervals import (
     effective_sample_size,
-    fraction_text,
-    is_carried,
     noise_interval,
     replicates_interval,
     share_interval,
 )
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, level_of
 from ppafo.studies.loading import study_of
-from ppafo.studies.study import DEFAULT_SEED, changes_of, choose_configurations, configurations_with, with_overrides
+from ppafo.studies.study import DEFAULT_SEED, Configuration, configurations_with
 from ppafo.studies.varying import VariedPath, distribution_in, value_at, varied_path
 from ppafo.study.blocks import unvaried
 from ppafo.study.runs import FAILED, Rows, RunCounter, scenario_runs

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from ppafo.analyses import ask, np
 from ppafo.arguments import Confidence, MaximumFailed, Name, Overrides, Seed, Tasks, Threads, Whole, Word, checked
-from ppafo.errors import StudyError
+from ppafo.errors import StudyError, at_fault
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 from ppafo.units.shown import shown_in
@@ -32,6 +33,8 @@ AS_WRITTEN = "as written"
 """Task name of scenarios that run as written, without overrides of a task."""
 DEFAULT_DRAWS = 4096
 """Default number of draws of the uncertain values."""
+_FEWEST_EFFECTIVE = 50.0
+"""Smallest effective number of draws for which a normal interval is accurate to half a percent."""
 _SAME = 1.0e-9
 """Relative difference up to which two values count as equal."""
 _GAS = "gas_supplied"
@@ -203,7 +206,7 @@ def compare(
     if not ask.FEWEST_DRAWS <= count <= ask.MAXIMUM_DRAWS:
         raise StudyError(f"draws = {count!r}: must be at least {ask.FEWEST_DRAWS} and at most {ask.MAXIMUM_DRAWS:,}")
     loaded = ask.study_of(study) if study is not None else None
-    chosen = ask.choose_configurations(configurations or None, loaded, overrides)
+    chosen = _chosen(configurations or None, loaded, tuple(overrides))
     names = [configuration.name for configuration in chosen]
     if baseline is not None and baseline not in names:
         raise StudyError(f"baseline: there is no configuration '{baseline}'{known_names(baseline, names)}")
@@ -267,8 +270,52 @@ def compare(
         )
     device = next(iter(scenarios.values()))
     with shown_in(device.device.shown if loaded is None else loaded.shown_for(device)):
-        changes = ask.changes_of(chosen, None if configurations else loaded, overrides)
+        changes = _changes_of(chosen, None if configurations else loaded, tuple(overrides))
         return _finding(replace(found, remarks=remarks), check, changes)
+
+
+def _chosen(
+    configurations: Configured | None, study: Study | None, overrides: Sequence[str]
+) -> tuple[ask.Configuration, ...]:
+    """Return the given scenarios, else the configurations of the study: at least two, with different names."""
+    # Distributions that hold in some configurations only name those of the study, not the ones given here.
+    if configurations is None:
+        if study is None:
+            raise StudyError("nothing to compare: give scenarios, a study, or both")
+        chosen = study.configurations
+    else:
+        if study is not None and study.only:
+            path, varying = next(iter(study.only.items()))
+            raise StudyError(
+                f"study '{study.name}': '{path}' varies only in {', '.join(varying)}; omit the other scenarios"
+            )
+        named = configurations.values() if isinstance(configurations, Mapping) else configurations
+        with at_fault("configurations"):
+            scenarios = [ask.scenario_or_load(named_scenario) for named_scenario in named]
+        names = (
+            list(configurations) if isinstance(configurations, Mapping) else [scenario.name for scenario in scenarios]
+        )
+        if (repeated := first_twice(names)) is not None:
+            raise StudyError(f"two scenarios are named '{repeated}'; give different names in a study file")
+        chosen = tuple(map(ask.Configuration, names, scenarios))
+    if len(chosen) < 2:
+        raise StudyError(f"a comparison needs at least two configurations, not {len(chosen)}")
+    return ask.configurations_with(chosen, overrides)
+
+
+def _changes_of(
+    configurations: Sequence[ask.Configuration], study: Study | None, overrides: Sequence[str]
+) -> tuple[str, ...]:
+    """Return the caller's overrides of compared configurations; of one configuration alone as ``NAME:PATH=VALUE``.
+
+    Overrides in the file of a ``study``, whose configurations are compared, are not among them.
+    """
+    if study is not None:
+        return *study.changes, *ask.changes_in(*(each.scenario for each in configurations), overrides=overrides)
+    own = [(each.name, text) for each in configurations for text in ask.changes_in(each.scenario)]
+    uses = Counter(text for _, text in own)
+    common = {text for text, count in uses.items() if count == len(configurations)}
+    return tuple(dict.fromkeys(text if text in common else f"{name}:{text}" for name, text in own))
 
 
 def _check_different_values(study: Study, scenarios: Mapping[tuple[str, str], Scenario]) -> None:
@@ -460,7 +507,8 @@ def _remarks(found: ComparisonResult) -> list[str]:
                 f"of {pair.effective_size:.3g} of {pair.pairs:,} draws: do not trust its interval; the probability of "
                 "being better is not affected"
                 for metric, pair in case.pairs.items()
-                if not ask.is_carried(pair.effective_size, pair.pairs)
+                # Of few draws half their number suffices: if all are equal, the interval has no width and is reliable.
+                if pair.effective_size < min(_FEWEST_EFFECTIVE, 0.5 * pair.pairs)
             ]
     # Several tasks may have the same remark.
     return [*dict.fromkeys(filter(None, remarks)), *failed, *uncertain, *([_NOISE] if found.has_noise else [])]
@@ -572,7 +620,9 @@ def _paired(found: ComparisonResult, cases: Sequence[ComparedCase], case: Compar
             kind.change_interval(pair.difference),
             "equal in all" if pair.better is not None and pair.equal == 1.0 else better,
         )
-        noise = "-" if pair.noise is None else ask.fraction_text(pair.noise)
+        share, noise = pair.noise, "-"
+        if share is not None:
+            noise = f"{100.0 * share.value:.3g} % [{100.0 * share.low:.3g}, {100.0 * share.high:.3g}]"
         rows.append((*row, noise) if found.has_noise else row)
     titles = ("metric", "unit", "nominal change", "change over the draws: median (5 to 95 %)", "mean difference")
     probable = ("probability of being better", *(["spread due to noise"] if found.has_noise else []))

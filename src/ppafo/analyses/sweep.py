@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from ppafo.arguments import Count, Executor, Overrides, Seed, Threads, Word, checked
+from ppafo.errors import StudyError
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.wording import said_of_configuration
@@ -80,10 +81,11 @@ def sweep(
     import numpy as np
 
     from ppafo.analyses.study_results import SUMMARY, StudyResults, finding_of, summarise
+    from ppafo.metrics import METRICS
     from ppafo.simulation.gains import warn_of_gains
     from ppafo.storage.files import temporary_folder
     from ppafo.studies.loading import study_of
-    from ppafo.studies.study import check_can_be_swept
+    from ppafo.studies.study import NO_SAMPLE
     from ppafo.study.executing import computed_by, executor_of
     from ppafo.study.runs import RunCounter
     from ppafo.study.store import claim, compute_chunk, read_manifest, study_folder
@@ -91,7 +93,11 @@ def sweep(
 
     workers = executor_of(executor)
     chosen = study_of(study, overrides, draws, seed)
-    check_can_be_swept(chosen)
+    if chosen.drawn and chosen.sample.method is None:
+        raise StudyError(f"study '{chosen.name}': {NO_SAMPLE}")
+    if not (chosen.outputs.metrics or chosen.outputs.traces):
+        said = f"(such as {', '.join(list(METRICS)[:4])}), trajectories or bands"
+        raise StudyError(f"study '{chosen.name}': [outputs] is empty: give metrics {said}")
     kept = temporary_folder("ppafo-study") if out is None else None
     folder = study_folder(kept.name if kept is not None else str(out))
     for configuration in chosen.configurations:

@@ -20,7 +20,7 @@ from ppafo.arguments import Overrides, checked
 from ppafo.documents.toml_text import TomlKind, beside
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, refused_as
 from ppafo.linear_algebra import on_one_thread
-from ppafo.loading import load_scenario, placed, reloaded, usage_text
+from ppafo.loading import load_scenario, placed, reloaded, usage_text, with_overrides
 from ppafo.metrics import Metric
 from ppafo.metrics.metric import controlled_in
 from ppafo.model.controlled import CONTROLLED, TORQUE
@@ -43,7 +43,6 @@ from ppafo.studies.distributions import Distribution, Floats
 from ppafo.studies.draws import Uncertainty, uncertainty_of
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, difference_of, level_of
 from ppafo.studies.loading import list_studies, load_study, read_source
-from ppafo.studies.study import with_overrides
 from ppafo.studies.varying import VariedPath, distribution_in, value_at, varied_path
 from ppafo.study.runs import Rows, RunCounter, scenario_runs
 from ppafo.units.shown import in_units, quantity_of_unit

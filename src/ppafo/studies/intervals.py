@@ -7,9 +7,6 @@ import numpy as np
 from ppafo.report.kind import ConfidenceInterval
 from ppafo.studies.distributions import Floats
 
-FEWEST_EFFECTIVE = 50.0
-"""Smallest effective number of draws for which a normal interval is accurate to half a percent."""
-
 
 def replicates_interval(values: Floats, replicates: int, confidence: float) -> ConfidenceInterval:
     """Return the mean with Student's confidence interval from the spread between replicates.
@@ -55,14 +52,6 @@ def effective_sample_size(values: Floats) -> float:
         return float(values.size)
     skewness = float(np.mean(away**3)) / square**1.5
     return float(values.size / max(1.0, skewness**2))
-
-
-def is_carried(effective: float, draws: int) -> bool:
-    """Return whether the effective number of draws is large enough for a reliable confidence interval of the mean.
-
-    For few draws, half of their number suffices: if all values are equal, the interval has no width and is reliable.
-    """
-    return effective >= min(FEWEST_EFFECTIVE, 0.5 * draws)
 
 
 def noise_interval(values: Floats, others: Floats, confidence: float) -> ConfidenceInterval | None:
@@ -114,8 +103,3 @@ def share_interval(hits: Floats, replicates: int, confidence: float) -> Confiden
         return fraction_interval(count, known.size, confidence)
     interval = replicates_interval(hits, replicates, confidence)
     return ConfidenceInterval(interval.value, max(0.0, interval.low), min(1.0, interval.high))
-
-
-def fraction_text(fraction: ConfidenceInterval) -> str:
-    """Format a fraction with its confidence interval, in percent."""
-    return f"{100.0 * fraction.value:.3g} % [{100.0 * fraction.low:.3g}, {100.0 * fraction.high:.3g}]"

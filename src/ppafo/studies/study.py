@@ -1,16 +1,13 @@
 """Study as frozen values in SI units: configurations, grid points, draws, runs, and outputs."""
 
 import math
-import re
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, Literal
 
 from ppafo.engine.channels import TRACED
-from ppafo.errors import PpafoError, StudyError, at_fault, refused_as
-from ppafo.loading import reloaded, scenario_or_load
+from ppafo.errors import PpafoError, StudyError, refused_as
+from ppafo.loading import with_overrides
 from ppafo.metrics import METRICS
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.declaration import Number, Quantity
@@ -18,7 +15,6 @@ from ppafo.parameters.declared import Many, Words
 from ppafo.parameters.parameter_set import PATHS_THAT_SET_UNITS, chosen_units
 from ppafo.parameters.records import keyed
 from ppafo.simulation.ensemble.running import lacking, offered
-from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.studies.distributions import Distribution
 from ppafo.wording import first_twice, known_names
@@ -195,40 +191,6 @@ def with_followers(columns: Mapping[str, Any], same: Mapping[str, str]) -> dict[
     return {**columns, **{path: columns[other] for path, other in same.items() if other in columns}}
 
 
-# Settings of a law: an object in its place ignores them, except rate and period, at which it is called.
-_SETTING = re.compile(r"\s*controller\.(?!rate|period)")
-Configurations = Mapping[str, Scenario | str | Path] | Sequence[Scenario | str | Path]
-
-
-def choose_configurations(
-    configurations: Configurations | None, study: Study | None, overrides: Iterable[str]
-) -> tuple[Configuration, ...]:
-    """Return the given scenarios, else the configurations of the study: at least two, with different names."""
-    # Distributions that hold in some configurations only name those of the study, not the ones given here.
-    if configurations is None:
-        if study is None:
-            raise StudyError("nothing to compare: give scenarios, a study, or both")
-        chosen = study.configurations
-    else:
-        if study is not None and study.only:
-            path, varying = next(iter(study.only.items()))
-            raise StudyError(
-                f"study '{study.name}': '{path}' varies only in {', '.join(varying)}; omit the other scenarios"
-            )
-        named = configurations.values() if isinstance(configurations, Mapping) else configurations
-        with at_fault("configurations"):
-            scenarios = [scenario_or_load(named_scenario) for named_scenario in named]
-        names = (
-            list(configurations) if isinstance(configurations, Mapping) else [scenario.name for scenario in scenarios]
-        )
-        if (repeated := first_twice(names)) is not None:
-            raise StudyError(f"two scenarios are named '{repeated}'; give different names in a study file")
-        chosen = tuple(map(Configuration, names, scenarios))
-    if len(chosen) < 2:
-        raise StudyError(f"a comparison needs at least two configurations, not {len(chosen)}")
-    return configurations_with(chosen, overrides)
-
-
 def configurations_with(configurations: Sequence[Configuration], overrides: Iterable[str]) -> tuple[Configuration, ...]:
     """Apply overrides to all configurations, or to a single configuration if addressed as ``NAME:PATH=VALUE``.
 
@@ -250,49 +212,3 @@ def configurations_with(configurations: Sequence[Configuration], overrides: Iter
                 replace(configuration, scenario=with_overrides(configuration.scenario, own[configuration.name]))
             )
     return tuple(changed)
-
-
-def changes_of(
-    configurations: Sequence[Configuration], study: Study | None, overrides: Iterable[str]
-) -> tuple[str, ...]:
-    """Return the caller's overrides of compared configurations; of one configuration alone as ``NAME:PATH=VALUE``.
-
-    Overrides in the file of a ``study``, whose configurations are compared, are not among them.
-    """
-    if study is not None:
-        return *study.changes, *changes_in(*(each.scenario for each in configurations), overrides=overrides)
-    own = [(each.name, text) for each in configurations for text in changes_in(each.scenario)]
-    uses = Counter(text for _, text in own)
-    common = {text for text, count in uses.items() if count == len(configurations)}
-    return tuple(dict.fromkeys(text if text in common else f"{name}:{text}" for name, text in own))
-
-
-def with_overrides(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
-    """Apply overrides to a scenario; StudyError if the scenario was changed in Python, which reloading would undo.
-
-    A Python object that controls the scenario is kept.
-    """
-    changes = tuple(overrides)
-    if not changes:
-        return scenario
-    of_object = [text for text in changes if scenario.controller.custom is not None and _SETTING.match(text)]
-    if of_object:
-        raise StudyError(
-            f"override '{of_object[0]}': scenario '{scenario.name}' has a Python controller; set the value in it"
-        )
-    # Overrides begin at what the file said, so what was replaced in Python would silently come back.
-    if reloaded(scenario, ()) != scenario:
-        raise StudyError(
-            f"scenario '{scenario.name}' was changed in Python, which overrides would undo; load it with the overrides"
-        )
-    return reloaded(scenario, changes)
-
-
-def check_can_be_swept(study: Study) -> None:
-    """Raise StudyError for a study without a number of draws or without outputs, which only a sweep needs."""
-    with refused_as(StudyError, f"study '{study.name}'", StudyError):
-        if study.drawn and study.sample.method is None:
-            raise StudyError(NO_SAMPLE)
-        if not (study.outputs.metrics or study.outputs.traces):
-            known = ", ".join(list(METRICS)[:4])
-            raise StudyError(f"[outputs] is empty: give metrics (such as {known}), trajectories or bands")

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
+from ppafo.analyses.sweep import sweep
 from ppafo.errors import StudyError
 from ppafo.studies.loading import list_studies, load_study
-from ppafo.studies.study import check_can_be_swept
 
 AREA = {"path": "valve.area", "kind": "uniform", "minimum": "10 mm^2", "maximum": "12 mm^2"}
 LEAK = AREA | {"path": "actuator.leak.area"}
@@ -77,7 +77,7 @@ def test_a_study_that_keeps_nothing_is_no_sweep_but_a_study(outputs: Any, small:
     document = {key: value for key, value in small.items() if value is not None}
     study = load_study(document)
     with pytest.raises(StudyError, match=r"study 'small': \[outputs\] is empty: give metrics"):
-        check_can_be_swept(study)
+        sweep(study)
 
 
 def test_a_study_that_varies_nothing_is_refused_unless_it_compares(small: Any) -> None:
@@ -152,7 +152,7 @@ def test_distributions_need_a_sample_and_a_grid_has_none(varying: Callable[..., 
     document = varying(AREA)
     del document["sample"]
     with pytest.raises(StudyError, match="'sample' is missing"):
-        check_can_be_swept(load_study(document))
+        sweep(document)
     with pytest.raises(StudyError, match="'sample' is missing"):
         load_study(document, draws=4)
     document = varying({"path": "valve.area", "kind": "list", "values": ["10 mm^2"]})
