@@ -26,7 +26,7 @@ import numpy as np
 from ppafo.errors import PpafoError
 from ppafo.parameters.declaration import OF_SECOND_CHAMBER
 from ppafo.parameters.reach import torque_reach
-from ppafo.remedy_trials import tried
+from ppafo.remedy_trials import verdict_of
 from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.simulate import Result, simulate
 
@@ -442,7 +442,7 @@ def _outcome(task: DrawnTask) -> dict[str, Any]:
     result = simulate(scenario)
     if not result.status.is_completed:
         return {"judged": "diverged", "sentence": result.status.message}
-    verdict = tried(scenario, result.tracking)
+    verdict = verdict_of(result)
     found: dict[str, Any] = {"judged": judge(result, task.only_switches), **_angle_errors(result)}
     if not verdict.fails:
         return found

@@ -5,7 +5,7 @@ import re
 import pytest
 
 import ppafo
-from ppafo.analyses.walk.benefit import benefit_sentence
+from ppafo.analyses.walk.answer import benefit_sentence
 from ppafo.walking.walk import compare_walks
 
 
