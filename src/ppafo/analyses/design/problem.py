@@ -7,7 +7,7 @@ from fractions import Fraction
 from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from ppafo.errors import (
 from ppafo.gait import load_gait
 from ppafo.gait.gait import BODY_MASSES
 from ppafo.loading import reloaded
-from ppafo.model.declaration import Number, Quantity
+from ppafo.model.declaration import Number
 from ppafo.parameters.bottles.bottle import Bottle, load_bottle
 from ppafo.parameters.declared import SHORT_NAME, Many, Words
 from ppafo.parameters.records import SchemaVersion, checked_record, keyed, record_schema
@@ -41,14 +41,11 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.storage.reading import read_recording
 from ppafo.units import parse_quantity, split_quantity
 from ppafo.walking.bottle.supply import is_of_bottle
-from ppafo.wording import known_names
 
 FILE = TomlKind("design", "design", resources.files("ppafo.analyses.design") / "library", StudyError)
 FROM_GAIT = "gait:falisse2019-subject1,mass=72.6 kg,share=0.05"
 """Example of a profile that is a share of the ankle moment of a wearer with a gait."""
-_GAIT = "gait:"
-_OF_WEARER = ("mass", "share")
-_STRIDE_SAMPLES = 201
+_GAIT, _STRIDE_SAMPLES = "gait:", 201
 _FOR_A_CYLINDER = "; search supply.pressure by 'ppafo find' with controller.kind=damped_proportional"
 _TORQUE = "N m"
 _ROUNDING = 1.0e-9
@@ -60,6 +57,14 @@ _LARGEST_DENOMINATOR = 10**6
 
 
 @dataclass(frozen=True, slots=True)
+class GaitShare:
+    """Share of the ankle moment of a wearer with a gait, as given behind the name of the gait."""
+
+    mass: float = keyed(Number("kg", "body mass of the wearer", None, *BODY_MASSES))
+    share: float = keyed(Number("", "share of the ankle moment", None, 0.0, 1.0, minimum_allowed=False))
+
+
+@dataclass(frozen=True, slots=True)
 class ProfileSection:
     """Section of a sizing file: torque over one repetition, from a recording or as times and torques."""
 
@@ -67,9 +72,73 @@ class ProfileSection:
         f"a .csv or .nc file or a result folder, relative to this file; or '{FROM_GAIT}'", None
     )
     channel: str = keyed("channel of the recording, in N m", "torque")
-    time: tuple[str, ...] = keyed("times with unit, from 0 on; the profile repeats after the last", ())
-    torque: tuple[str, ...] = keyed("torques with unit, one for each time", ())
+    time: tuple[Annotated[float, Number("s", "time")], ...] = keyed(
+        "times with unit, from 0 on; the profile repeats after the last", ()
+    )
+    torque: tuple[Annotated[float, Number(_TORQUE, "torque")], ...] = keyed("torques with unit, one for each time", ())
     scale: float = keyed("factor on every torque: the fraction that the orthosis provides", 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class UseTable:
+    """Section of a sizing file: use on one bottle, as repetitions or hours, with a reserve."""
+
+    repetitions: int | None = keyed(
+        Number("", "number of repetitions of the profile, such as steps", minimum=1, whole=True), None
+    )
+    hours: float | None = keyed(
+        Number("", "hours of continuous use, instead of repetitions", minimum=0.0, minimum_allowed=False, plain=True),
+        None,
+    )
+    reserve: float = keyed(
+        Number("", "gas to be left in the bottle, as a fraction of the gas used", None, 0.0, 10.0, plain=True), 0.1
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class LimitsTable:
+    """Section of a sizing file: limit of the RMS torque error."""
+
+    rms_error: str = keyed("largest RMS torque error: '0.5 N m', or '5 %' of the largest torque")
+
+
+@dataclass(frozen=True, slots=True)
+class PressureTable:
+    """Section of a sizing file: range of supply pressures; both regulators have the same pressure."""
+
+    lowest: str = keyed("lowest supply pressure", "10 psi_g")
+    highest: str = keyed("highest supply pressure", "120 psi_g")
+
+
+_FACTORS = Many(
+    Number("", "", None, 0.0, 1000.0, plain=True),
+    "factors by which each gain of the controller is multiplied",
+    least=1,
+    most=12,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SizingFile:
+    """Sizing file: design of a device that follows a torque profile."""
+
+    schema_version: SchemaVersion
+    name: str = keyed(Words(pattern=SHORT_NAME))
+    description: str = ""
+    scenario: str = keyed("device, motion, controller and sensors: a name, or a path")
+    overrides: tuple[str, ...] = keyed("changes to the scenario", ())
+    bottles: tuple[str, ...] = keyed("bottles to choose from: names, or paths relative to this file")
+    profile: ProfileSection
+    use: UseTable
+    limits: LimitsTable
+    valves: dict[str, dict[str, str]] = keyed(
+        "valves to choose from: by name, the values that the scenario's valve lacks"
+    )
+    pressure: PressureTable = PressureTable()
+    gain_factors: tuple[float, ...] = keyed(_FACTORS, (0.0, 0.5, 1.0, 3.0, 8.0))
+    simulated: int = keyed(
+        Number("", "repetitions to simulate; the first fills the lines", None, 1, 1000, whole=True), 3
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,195 +173,18 @@ class RequiredTorque:
 
     def at(self, time: Floats) -> Floats:
         """Return the torque of the repeated table of knots [N m] at times [s] from 0 on."""
-        times, values = np.append(self.knot_times, self.period), np.append(self.knot_values, self.knot_values[0])
-        return np.asarray(np.interp(np.mod(time, self.period), times, values))
-
-    def overrides(self) -> tuple[str, ...]:
-        """Return the scenario overrides that make the table the reference."""
-        kind = ("reference.kind=tabulated", f"reference.level=0 {_TORQUE}", f"reference.period={self.period!r} s")
-        times = enumerate(self.knot_times[1:].tolist(), 2)
-        values = enumerate(self.knot_values.tolist(), 1)
-        return (
-            *kind,
-            *(f"reference.time_{number:02d}={time!r} s" for number, time in times),
-            *(f"reference.value_{number:02d}={value!r} {_TORQUE}" for number, value in values),
-        )
-
-
-def read_profile(table: ProfileSection, folder: Path, file: str) -> RequiredTorque:
-    """Read the torque profile of a design file; paths of recordings and gaits are relative to ``folder``."""
-    where = f"{file}: profile"
-    is_typed = bool(table.time or table.torque)
-    if is_typed == (table.recording is not None):
-        raise StudyError(f"{where}: give either a recording, or both time and torque")
-    if is_typed:
-        time, torque, kind = *_profile_of_table(table, where), "typed"
-    elif str(table.recording).startswith(_GAIT):
-        time, torque = torque_of_gait(str(table.recording), folder, where)
-        torque, kind = table.scale * torque, "gait"
-    else:
-        with refused_as(StudyError, f"{where}.recording", DataError):
-            recording = read_recording(folder / str(table.recording))
-            channel: Any = recording[table.channel]
-            unit = recording.unit(table.channel)
-        if unit != _TORQUE:
-            raise StudyError(
-                f"{where}.channel = '{table.channel}' has the unit '{unit}'; choose a channel with a "
-                f"torque in {_TORQUE}"
-            )
-        if len(recording) < 2:
-            raise StudyError(f"{where}.recording: has only one sample; a torque profile needs two or more")
-        time, torque, kind = recording.time - recording.time[0], table.scale * channel, recording.kind
-    if not np.any(torque):
-        raise StudyError(f"{where}: the torque is 0 {_TORQUE} throughout; give a profile with a torque other than 0")
-    # The last sample is the first of the next repetition. Where the two differ it stays, a moment earlier: the table
-    # then jumps as the profile does.
-    samples = time[:-1], torque[:-1]
-    if torque[-1] != torque[0]:
-        samples = np.append(time[:-1], time[-1] - min(_MOMENT, 0.5 * (time[-1] - time[-2]))), torque
-    return RequiredTorque(time, torque, kind, *choose_knots(*samples))
-
-
-def torque_of_gait(text: str, folder: Path, where: str) -> tuple[Floats, Floats]:
-    """Return times [s] and torques [N m] over a stride: the share of a wearer's ankle moment that a text asks for.
-
-    The text has the form of ``FROM_GAIT``: name or file of a gait, body mass of the wearer, share of the ankle moment.
-    Raises StudyError in one line, prefixed with ``where``, for another text.
-    """
-    name, *settings = (part.strip() for part in text.removeprefix(_GAIT).split(","))
-    given = {key.strip(): value.strip() for key, _, value in (setting.partition("=") for setting in settings)}
-    for key in given.keys() - _OF_WEARER:
-        raise StudyError(f"{where}: '{text}': there is no '{key}'{known_names(key, _OF_WEARER)}")
-    if len(given) < len(settings):
-        raise StudyError(f"{where}: '{text}': give mass and share once")
-    if missing := [key for key in _OF_WEARER if key not in given]:
-        raise StudyError(f"{where}: '{text}': {' and '.join(missing)} missing; write for example '{FROM_GAIT}'")
-    with refused_as(StudyError, f"{where}: '{text}'", DataError, UnitError):
-        gait = load_gait(beside(name, folder))
-        mass, share = parse_quantity(given["mass"], "kg"), parse_quantity(given["share"], "")
-        if gait.ankle_moment is None:
-            raise DataError("this gait has no ankle_moment")
-        least, most = BODY_MASSES
-        if not (least <= mass <= most and 0.0 < share <= 1.0):
-            raise DataError(f"mass must be from {least:g} to {most:g} kg, share above 0 and at most 1")
-    phases = np.linspace(0.0, 1.0, _STRIDE_SAMPLES)
-    return gait.stride_time * phases, share * mass * gait.ankle_moment.values_at(phases)
-
-
-def choose_knots(time: Floats, torque: Floats) -> tuple[Floats, Floats]:
-    """Return at most 32 samples, starting with the first, whose linear interpolation approximates all samples.
-
-    The sample with the largest error is added next. No knots are added between the last sample and the next repetition.
-    """
-    chosen = [0, time.size - 1]
-    # Greedy, not best: a profile has few features, and each knot takes away what is worst.
-    while len(chosen) < min(KNOTS, time.size):
-        between = np.interp(time, time[chosen], torque[chosen])
-        worst = int(np.argmax(np.abs(between - torque)))
-        if abs(between[worst] - torque[worst]) <= _ROUNDING * np.ptp(torque):
-            break
-        chosen = sorted([*chosen, worst])
-    return time[chosen], torque[chosen]
-
-
-def _profile_of_table(table: ProfileSection, where: str) -> tuple[Floats, Floats]:
-    if len(table.time) != len(table.torque) or len(table.time) < 2:
-        raise StudyError(
-            f"{where}: time has {len(table.time)} entries and torque has {len(table.torque)}; both need the same "
-            "number of entries, at least two"
-        )
-    series = []
-    for texts, unit, name in ((table.time, "s", "time"), (table.torque, _TORQUE, "torque")):
-        numbers = []
-        for text in texts:
-            with refused_as(StudyError, f"{where}.{name}: '{text}'", UnitError):
-                numbers.append(parse_quantity(text, unit))
-        series.append(np.array(numbers))
-    time, torque = series
-    if time[0] != 0.0 or np.any(np.diff(time) <= 0.0):
-        raise StudyError(f"{where}.time: must start at '0 s' and increase strictly")
-    return time, table.scale * torque
-
-
-_FACTORS = Many(
-    Quantity("", "", "", None, 0.0, 1000.0, plain=True),
-    "factors by which each gain of the controller is multiplied",
-    least=1,
-    most=12,
-)
-
-
-@dataclass(frozen=True, slots=True)
-class UseTable:
-    """Section of a sizing file: use on one bottle, as repetitions or hours, with a reserve."""
-
-    repetitions: int | None = keyed(
-        Number("", "number of repetitions of the profile, such as steps", minimum=1, whole=True), None
-    )
-    hours: float | None = keyed(
-        Number("", "hours of continuous use, instead of repetitions", minimum=0.0, minimum_allowed=False, plain=True),
-        None,
-    )
-    reserve: float = keyed(
-        Number("", "gas to be left in the bottle, as a fraction of the gas used", None, 0.0, 10.0, plain=True), 0.1
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class LimitsTable:
-    """Section of a sizing file: limit of the RMS torque error."""
-
-    rms_error: str = keyed("largest RMS torque error: '0.5 N m', or '5 %' of the largest torque")
-
-
-@dataclass(frozen=True, slots=True)
-class PressureTable:
-    """Section of a sizing file: range of supply pressures; both regulators have the same pressure."""
-
-    lowest: str = keyed("lowest supply pressure", "10 psi_g")
-    highest: str = keyed("highest supply pressure", "120 psi_g")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SizingFile:
-    """Sizing file: design of a device that follows a torque profile."""
-
-    schema_version: SchemaVersion
-    name: str = keyed(Words(pattern=SHORT_NAME))
-    description: str = ""
-    scenario: str = keyed("device, motion, controller and sensors: a name, or a path")
-    overrides: tuple[str, ...] = keyed("changes to the scenario", ())
-    bottles: tuple[str, ...] = keyed("bottles to choose from: names, or paths relative to this file")
-    profile: ProfileSection
-    use: UseTable
-    limits: LimitsTable
-    valves: dict[str, dict[str, str]] = keyed(
-        "valves to choose from: by name, the values that the scenario's valve lacks"
-    )
-    pressure: PressureTable = PressureTable()
-    gain_factors: tuple[float, ...] = keyed(_FACTORS, (0.0, 0.5, 1.0, 3.0, 8.0))
-    simulated: int = keyed(
-        Number("", "repetitions to simulate; the first fills the lines", None, 1, 1000, whole=True), 3
-    )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CandidateValve:
-    """Valve to choose from: its name, and its numbers by path [SI], such as ``valve.area``."""
-
-    name: str
-    numbers: Mapping[str, float]
+        return np.asarray(np.interp(time, self.knot_times, self.knot_values, period=self.period))
 
 
 @dataclass(frozen=True, slots=True)
 class SizingProblem:
     """Sizing problem in SI units: torque profile, scenario, valves and bottles to choose from, and limits.
 
-    ``asked_profile``: profile given in place of the file's; empty for the file's own
     ``scenario``: scenario that follows the profile for ``simulated`` repetitions
     ``repetitions``: number of repetitions that one bottle must supply
     ``reserve``: fraction of the gas to be left in the bottle [-]
     ``largest_error``: limit of the RMS error [N m]
+    ``valves``: numbers of each valve to choose from, by path [SI], such as ``valve.area``
     ``lowest_pressure``, ``highest_pressure``: range of the supply pressure [Pa absolute]
     ``gains``: paths of the controller's gains
     ``gain_factors``: factors on the gains; every combination is tried
@@ -307,13 +199,12 @@ class SizingProblem:
     repetitions: float
     reserve: float
     largest_error: float
-    valves: tuple[CandidateValve, ...]
+    valves: Mapping[str, Mapping[str, float]]
     bottles: tuple[Bottle, ...]
     lowest_pressure: float
     highest_pressure: float
     gains: tuple[str, ...]
     gain_factors: tuple[float, ...]
-    asked_profile: str = ""
 
     @property
     def atmosphere(self) -> float:
@@ -321,14 +212,13 @@ class SizingProblem:
         return self.scenario.device.supply.atmospheric_pressure
 
     @property
-    def torque_constant(self) -> float:
-        """Torque constant of the actuator [m^3]."""
-        return self.scenario.device.actuator.torque_constant
-
-    @property
     def hours(self) -> float:
         """Duration of all repetitions of the profile without a pause [h]."""
         return self.repetitions * self.profile.period / _SECONDS_PER_HOUR
+
+    def ceiling(self, pressure: float) -> float:
+        """Return the largest static torque [N m] at a supply pressure [Pa absolute]; equation (2) of the paper."""
+        return self.scenario.device.actuator.torque_constant * (pressure - self.atmosphere)
 
 
 @checked
@@ -350,14 +240,14 @@ def load_design(problem: str | Path, *, profile: str | Path | None = None, plugi
     with at_fault("problem"):
         content = FILE.read(problem)
     document = checked_record(SizingFile, FILE.parse(content, file), file, StudyError, content)
-    wrong, valves, bottles = list[PpafoError](), list[CandidateValve](), list[Bottle]()
+    wrong, valves, bottles = list[PpafoError](), dict[str, Mapping[str, float]](), list[Bottle]()
     atmosphere, largest, pressures = STANDARD_ATMOSPHERE, 1.0, []
     with noted_in(wrong):
         if profile:
             with at_fault("profile"):
-                required = read_profile(ProfileSection(recording=str(profile)), Path(), file)
+                required = read_profile(ProfileSection(recording=str(profile)), Path(), f"{file}: profile")
         else:
-            required = read_profile(document.profile, folder, file)
+            required = read_profile(document.profile, folder, f"{file}: profile")
         largest = required.largest
     with noted_in(wrong):
         plain = load_scenario(beside(document.scenario, folder), document.overrides)
@@ -372,7 +262,7 @@ def load_design(problem: str | Path, *, profile: str | Path | None = None, plugi
             with noted_in(wrong), refused_as(StudyError, f"{file}: valves.{name}", PpafoError):
                 valve = reloaded(plain, [f"valve.{key}={value}" for key, value in values.items()]).device.valve
                 numbers = {**asdict(valve.orifice), **valve.settings}
-                valves.append(CandidateValve(name, {f"valve.{key}": value for key, value in numbers.items()}))
+                valves[name] = {f"valve.{key}": value for key, value in numbers.items()}
         for name in dict.fromkeys(document.bottles):
             with noted_in(wrong), refused_as(StudyError, f"{file}: bottles", ParameterError):
                 bottle = load_bottle(beside(name, folder))
@@ -381,7 +271,7 @@ def load_design(problem: str | Path, *, profile: str | Path | None = None, plugi
                     raise ParameterError(f"'{name}' {gas}: choose another, or set gas.species in overrides")
                 bottles.append(bottle)
     with noted_in(wrong):
-        for key, text in (("lowest", document.pressure.lowest), ("highest", document.pressure.highest)):
+        for key, text in asdict(document.pressure).items():
             with refused_as(StudyError, f"{file}: pressure.{key} = '{text}'", UnitError):
                 pressures.append(parse_quantity(text, "Pa_a", atmosphere))
         if not atmosphere < pressures[0] < pressures[1]:
@@ -398,21 +288,24 @@ def load_design(problem: str | Path, *, profile: str | Path | None = None, plugi
         if largest_error <= 0.0:
             raise UnitError("must be above 0; write '0.5 N m' or '5 %'")
     raise_noted(wrong)
-    # The least common multiple of both times: the run then ends with a sample of the controller and of the output.
-    a, b = (
+    # A multiple of both intervals: the run then ends with a sample of the controller and of the output.
+    a, b, duration = (
         Fraction(interval).limit_denominator(_LARGEST_DENOMINATOR)
-        for interval in (plain.controller.period, plain.run.output_interval)
+        for interval in (plain.controller.period, plain.run.output_interval, document.simulated * required.period)
     )
-    least = math.lcm(a.numerator * b.denominator, b.numerator * a.denominator)
-    grain = Fraction(least, a.denominator * b.denominator)
-    count = math.ceil(Fraction(document.simulated * required.period).limit_denominator(_LARGEST_DENOMINATOR) / grain)
-    scenario = reloaded(plain, (*required.overrides(), f"run.duration={float(count * grain)!r} s"))
+    grain = Fraction(math.lcm(a.numerator * b.denominator, b.numerator * a.denominator), a.denominator * b.denominator)
+    numbers = {"level": f"0 {_TORQUE}", "period": f"{required.period!r} s"}
+    numbers |= {f"time_{row:02d}": f"{time!r} s" for row, time in enumerate(required.knot_times[1:].tolist(), 2)}
+    numbers |= {f"value_{row:02d}": f"{each!r} {_TORQUE}" for row, each in enumerate(required.knot_values.tolist(), 1)}
+    overrides = ["reference.kind=tabulated", *(f"reference.{name}={text}" for name, text in numbers.items())]
+    scenario = reloaded(plain, [*overrides, f"run.duration={float(math.ceil(duration / grain) * grain)!r} s"])
     # The settings that multiply a torque error.
     quantities = CONTROLLERS[scenario.controller.kind].quantities
     gains = tuple(f"controller.{quantity.name}" for quantity in quantities if "(N m" in quantity.unit)
     return SizingProblem(
         name=document.name,
-        description=document.description,
+        # The file describes its own profile.
+        description="" if profile else document.description,
         file=file,
         scenario=scenario,
         profile=required,
@@ -420,14 +313,78 @@ def load_design(problem: str | Path, *, profile: str | Path | None = None, plugi
         repetitions=float(use.repetitions or _SECONDS_PER_HOUR * float(use.hours or 0.0) / required.period),
         reserve=use.reserve,
         largest_error=largest_error,
-        valves=tuple(valves),
+        valves=valves,
         bottles=tuple(sorted(bottles, key=lambda bottle: bottle.mass)),
         lowest_pressure=pressures[0],
         highest_pressure=pressures[1],
         gains=gains,
         gain_factors=tuple(sorted(set(map(float, document.gain_factors)))) if gains else (1.0,),
-        asked_profile=str(profile or ""),
     )
+
+
+def read_profile(table: ProfileSection, folder: Path, where: str) -> RequiredTorque:
+    """Read a torque profile; recordings and gaits are relative to ``folder``, messages begin with ``where``."""
+    source = table.recording
+    if bool(table.time or table.torque) == (source is not None):
+        raise StudyError(f"{where}: give either a recording, or both time and torque")
+    if source is None:
+        time, torque, kind = np.array(table.time), np.array(table.torque), "typed"
+        if time.size != torque.size or time.size < 2:
+            counts = f"time has {time.size} entries and torque has {torque.size}"
+            raise StudyError(f"{where}: {counts}; both need the same number of entries, at least two")
+        if time[0] != 0.0 or np.any(np.diff(time) <= 0.0):
+            raise StudyError(f"{where}.time: must start at '0 s' and increase strictly")
+    elif source.startswith(_GAIT):
+        time, torque, kind = *torque_of_gait(source, folder, where), "gait"
+    else:
+        with refused_as(StudyError, f"{where}.recording", DataError):
+            recording = read_recording(folder / source)
+            time, torque, kind = recording.time - recording.time[0], recording[table.channel], recording.kind
+            if (unit := recording.unit(table.channel)) != _TORQUE:
+                raise DataError(f"channel '{table.channel}' has the unit '{unit}'; choose one in {_TORQUE}")
+            if len(recording) < 2:
+                raise DataError("has only one sample; a torque profile needs two or more")
+    torque = table.scale * torque
+    if not np.any(torque):
+        raise StudyError(f"{where}: the torque is 0 {_TORQUE} throughout; give a profile with a torque other than 0")
+    # The last sample is the first of the next repetition. Where the two differ it stays, a moment earlier: the table
+    # then jumps as the profile does.
+    samples = time[:-1], torque[:-1]
+    if torque[-1] != torque[0]:
+        samples = np.append(time[:-1], time[-1] - min(_MOMENT, 0.5 * (time[-1] - time[-2]))), torque
+    return RequiredTorque(time, torque, kind, *choose_knots(*samples))
+
+
+def torque_of_gait(text: str, folder: Path, where: str) -> tuple[Floats, Floats]:
+    """Return times [s] and torques [N m] over a stride, of the share of a wearer's ankle moment in ``FROM_GAIT``."""
+    place = f"{where}: '{text}'"
+    name, *settings = (part.strip() for part in text.removeprefix(_GAIT).split(","))
+    given = {key.strip(): value.strip() for key, _, value in (setting.partition("=") for setting in settings)}
+    if len(given) < len(settings):
+        raise StudyError(f"{place}: give mass and share once")
+    wearer = checked_record(GaitShare, given, place, StudyError)
+    with refused_as(StudyError, place, DataError):
+        gait = load_gait(beside(name, folder))
+        if gait.ankle_moment is None:
+            raise DataError("this gait has no ankle_moment")
+    phases = np.linspace(0.0, 1.0, _STRIDE_SAMPLES)
+    return gait.stride_time * phases, wearer.share * wearer.mass * gait.ankle_moment.values_at(phases)
+
+
+def choose_knots(time: Floats, torque: Floats) -> tuple[Floats, Floats]:
+    """Return at most 32 samples, starting with the first, whose linear interpolation approximates all samples.
+
+    The sample with the largest error is added next. No knots are added between the last sample and the next repetition.
+    """
+    chosen = [0, time.size - 1]
+    # Greedy, not best: a profile has few features, and each knot takes away what is worst.
+    while len(chosen) < min(KNOTS, time.size):
+        between = np.interp(time, time[chosen], torque[chosen])
+        worst = int(np.argmax(np.abs(between - torque)))
+        if abs(between[worst] - torque[worst]) <= _ROUNDING * np.ptp(torque):
+            break
+        chosen = sorted([*chosen, worst])
+    return time[chosen], torque[chosen]
 
 
 json_schema = partial(record_schema, SizingFile, "ppafo design")

@@ -4,6 +4,7 @@ Each pressure is tried in one batch with many gains, and with some openings, of 
 be monotonic in the pressure.
 """
 
+import contextlib
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -11,12 +12,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import cycle, product
 from operator import methodcaller
-from typing import TYPE_CHECKING, Any, Literal, final
+from typing import Any, Literal, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.analyses.design.problem import CandidateValve, SizingProblem
+from ppafo.analyses.design.problem import SizingProblem
 from ppafo.analyses.endurance.discharge import TIME_IS_UP, discharge
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.control.catalog import CONTROLLERS
@@ -28,7 +29,7 @@ from ppafo.progress import Progress, Report
 from ppafo.report.finding import Finding, Section, columns_of
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
-from ppafo.report.style import BLACK, COLOURS, GREY, REFERENCE
+from ppafo.report.style import BLACK, COLOURS, REFERENCE
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.default_gains import gain_links
@@ -45,23 +46,16 @@ from ppafo.units.shown import in_units
 from ppafo.version import __version__
 from ppafo.walking.bottle.coupling import Schedule
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 Limit = Literal["torque", "flow", "control", "pressure"]
-LIMITS: dict[Limit, str] = {
-    "torque": "the torque ceiling: torque constant times pressure",
-    "flow": "the flow: a larger opening would suffice",
-    "control": "the torque loop: no gains were found with which it follows",
-    "pressure": "pressure.lowest: no lower pressure was tried",
-}
-"""Quantities that limit a valve, each with its description in words."""
+"""What a valve needs for less pressure: more torque, a larger opening, a loop that follows, a lower pressure.lowest."""
 PRESSURE = Kind("Supply pressure", "Pa_a", "pressure", ".3g")
 TORQUE = Kind("Torque", "N m", "torque", ".3g")
 ERROR, GAS = "rms_error", "gas_supplied"
 OSCILLATES = "the torque loop oscillates"
 _OPENINGS = ("valve.area", "valve.sonic_conductance")
 
+Numbers = Mapping[str, float]
+"""Numbers of a valve by path [SI]."""
 STREAMS, _SEED = 16, 1
 """Noise streams of each trial if sensors are noisy, and their seed: the same for all trials and pressures."""
 SCALES = (1.0, 8.0, 64.0, 0.125, 0.015625)
@@ -106,10 +100,13 @@ _READING = (
 )
 Trial = NDArray[np.void]
 """Structured array of trials, with the fields of ``TRIAL``."""
-TRIAL = np.dtype([("pressure", np.float64), ("error", np.float64), ("gas", np.float64), ("gains", np.intp)])
+TRIAL = np.dtype(
+    [(name, np.float64) for name in ("pressure", "error", "gas")] + [("gains", np.intp), ("works", np.bool_)]
+)
 """Row of a trial: supply pressure [Pa absolute], RMS error [N m], gas per repetition [kg], index of the gain set.
 
-Error and gas are nan if a run failed or oscillated.
+Error and gas are nan if a run failed or oscillated. A trial ``works`` that keeps the error limit and provides the
+required share of the peak torque.
 """
 
 
@@ -117,9 +114,8 @@ Error and gas are nan if a run failed or oscillated.
 class SizedValve:
     """Sizing result of a valve in SI, at the supply pressure that keeps the error limit with the smallest bottle.
 
-    ``works``: False if no pressure keeps the error limit
     ``pressure``: chosen supply pressure [Pa absolute]; if none works, the pressure with the smallest error
-    ``lowest_pressure``: lowest pressure that works [Pa absolute]
+    ``lowest_pressure``: lowest pressure that works [Pa absolute]; None if no pressure works
     ``gains``: gains of the controller by path
     ``error``: RMS torque error [N m]
     ``gas``, ``gas_in_all``: gas per repetition and total gas with the reserve [kg]
@@ -130,11 +126,10 @@ class SizedValve:
         used, None without a bottle
     ``limit``: quantity that limits the lowest pressure
     ``remark``: note for the reader; empty if there is none
-    ``curve``: pressures [Pa absolute], errors [N m] and gas per repetition [kg], with the best gains at each pressure
+    ``tried``: trial with the best gains at each pressure, in the order of the pressures
     """
 
-    valve: CandidateValve
-    works: bool
+    name: str
     pressure: float
     lowest_pressure: float | None
     gains: Mapping[str, float]
@@ -145,7 +140,12 @@ class SizedValve:
     margins: Mapping[str, float | None]
     limit: Limit
     remark: str
-    curve: tuple[Floats, Floats, Floats]
+    tried: Trial
+
+    @property
+    def works(self) -> bool:
+        """True if a pressure keeps the error limit."""
+        return self.lowest_pressure is not None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,7 +155,6 @@ class Sizing:
     ``choice``, ``recording``: suggested valve, and its run on the profile; None without a suggestion
     ``failures``: number of failed runs by reason
     ``streams``: number of noise streams of every trial, whose error is the largest over the streams; 0 without noise
-    ``summary``: suggestion with its reason in a sentence, or why there is none
     """
 
     problem: SizingProblem
@@ -165,7 +164,37 @@ class Sizing:
     runs: int
     failures: Mapping[str, int]
     streams: int = 0
-    summary: str = ""
+
+    @property
+    def summary(self) -> str:
+        """Suggestion in a sentence, or why there is none."""
+        choice, recording, profile = self.choice, self.recording, self.problem.profile
+        if choice is None or recording is None:
+            working = [sized for sized in self.valves if sized.works]
+            near = min(self.valves, key=lambda sized: np.nan_to_num(sized.error, nan=np.inf))
+            nearest = f"{TORQUE.text(near.error)} with {near.name} at {PRESSURE.text(near.pressure)}"
+            reasons = [f"no valve keeps the error limit; the smallest error is {nearest}"]
+            if working:
+                reasons = ["valves keep the error limit, but no bottle lasts for the requested use"]
+            reasons += [f"{each.name}{cut}" for each in working or self.valves if (cut := self._cut_peak(each))]
+            return f"no suggestion: {'; '.join(reasons)}"
+        bottle = "" if choice.bottle is None else f" and {choice.bottle.name}"
+        short = [
+            f"{TORQUE.number(sign * reached)} of {TORQUE.text(sign * peak)}"
+            for sign in (1.0, -1.0)
+            if (peak := np.max(sign * profile.knot_values)) > _WHOLE_PEAK * profile.largest
+            and (reached := np.max(sign * recording["torque"])) < REACHED * peak
+        ]
+        reaches = f"; reaches {' and '.join(short)} in the simulated run" * bool(short)
+        suggested = f"suggested: {choice.name} at {PRESSURE.text(choice.pressure)}{bottle}"
+        return f"{suggested}, the smallest that lasts and keeps the error limit{self._cut_peak(choice)}{reaches}"
+
+    def _cut_peak(self, sized: SizedValve) -> str:
+        """Return the fraction of the peak torque that a valve's pressure cuts off; "" for a whole peak."""
+        largest, most = self.problem.profile.largest, self.problem.ceiling(sized.pressure)
+        if (cut := 1.0 - most / largest) <= _WHOLE_PEAK or sized.error != sized.error:
+            return ""
+        return f", with {100.0 * cut:.0f} % of the peak cut off (at most {TORQUE.text(most)} of {TORQUE.text(largest)})"
 
     def json_document(self) -> dict[str, Any]:
         """Return the sized valves and the suggestion as plain data in SI."""
@@ -182,9 +211,9 @@ class Sizing:
                 "times": problem.profile.knot_times.tolist(),
                 "torques": problem.profile.knot_values.tolist(),
             },
-            "suggested": None if self.choice is None else self.choice.valve.name,
+            "suggested": None if self.choice is None else self.choice.name,
             "valves": [
-                {"valve": sized.valve.name, **fields_of(sized, *found), "margins": sized.margins or None}
+                {"valve": sized.name, **fields_of(sized, *found), "margins": sized.margins or None}
                 | {"bottle": None if sized.bottle is None else sized.bottle.name}
                 for sized in self.valves
             ],
@@ -215,12 +244,12 @@ class Trials:
         self.seeds = seeds_of_noise([problem.scenario], (), STREAMS, _SEED)
         self._threads = threads
 
-    def run(self, valve: CandidateValve, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> Trial:
-        """Run trials of a valve at supply pressures [Pa absolute].
+    def run(self, valve: Numbers, pressure: Floats, gains: NDArray[np.intp], opening: float = 1.0) -> Trial:
+        """Run trials of a valve at supply pressures [Pa absolute], each with an index of a gain set in ``gains``.
 
-        Each trial has an index of a gain set in ``gains`` and a factor on the valve opening in ``opening`` [-].
+        ``opening`` is a factor on the valve opening [-].
         """
-        scenario, streams, count = self.problem.scenario, max(1, self.seeds.size), pressure.size
+        problem, scenario, streams, count = self.problem, self.problem.scenario, max(1, self.seeds.size), pressure.size
         columns = self.columns(valve, pressure, gains, opening)
         error, gas = np.empty((2, streams, count))
         chunk = max(1, _AT_ONCE // streams)
@@ -233,17 +262,18 @@ class Trials:
             result = run_ensemble(scenario, tiled, (ERROR, GAS, REVERSALS), threads=self._threads)
             # A loop that oscillates is no design, whatever its error is.
             oscillates = command_turning(scenario, result.metrics, most_reversals(scenario)) > 1.0
-            error[:, rows] = np.where(oscillates, np.nan, result.metrics[ERROR]).reshape(streams, -1)
-            gas[:, rows] = np.where(oscillates, np.nan, result.metrics[GAS]).reshape(streams, -1)
+            for found, name in ((error, ERROR), (gas, GAS)):
+                found[:, rows] = np.where(oscillates, np.nan, result.metrics[name]).reshape(streams, -1)
             self.runs += oscillates.size
             self.failures.update(result.reasons.values())
             self.failures += Counter({OSCILLATES: int(np.count_nonzero(oscillates))})
         trial = np.empty(count, TRIAL)
         trial["pressure"], trial["gains"] = pressure, gains
-        trial["error"], trial["gas"] = error.max(axis=0), gas.mean(axis=0) / self.problem.simulated
+        trial["error"], trial["gas"] = error.max(axis=0), gas.mean(axis=0) / problem.simulated
+        trial["works"] = (trial["error"] <= problem.largest_error) & (pressure >= peak_pressure(problem))
         return trial
 
-    def best(self, valve: CandidateValve, pressure: Floats, opening: float = 1.0, like: int = 0) -> Trial:
+    def best(self, valve: Numbers, pressure: Floats, opening: float = 1.0, like: int = 0) -> Trial:
         """Return for each pressure the trial with the best set of gains at the scale of the gain set ``like``.
 
         The best set uses the least gas of all sets that keep the error limit; if no set keeps the limit, it has the
@@ -251,25 +281,27 @@ class Trials:
         """
         sets, first = self.combinations, like - like % self.combinations
         pressures, gains = np.repeat(pressure, sets), np.tile(first + np.arange(sets), pressure.size)
-        trial = self.run(valve, pressures, gains, np.full(pressures.size, opening)).reshape(pressure.size, sets)
+        trial = self.run(valve, pressures, gains, opening).reshape(pressure.size, sets)
         # Infinite for failed runs: argmin would take nan for the smallest.
         error = np.where(np.isnan(trial["error"]), np.inf, trial["error"])
-        works = error <= self.problem.largest_error
-        gas = np.where(works, trial["gas"], np.inf)
-        chosen = np.where(works.any(axis=1), gas.argmin(axis=1), error.argmin(axis=1))
+        keeps = error <= self.problem.largest_error
+        gas = np.where(keeps, trial["gas"], np.inf)
+        chosen = np.where(keeps.any(axis=1), gas.argmin(axis=1), error.argmin(axis=1))
         return np.asarray(trial[np.arange(pressure.size), chosen])
 
     def columns(
-        self, valve: CandidateValve, pressure: Floats, gains: NDArray[np.intp], opening: Floats
+        self, valve: Numbers, pressure: Floats, gains: NDArray[np.intp], opening: float = 1.0
     ) -> dict[str, Floats]:
         """Return the columns of trials in SI: numbers of the valve, both supply pressures, gains.
 
         The gains of the scenario fit its own device. For other valves and pressures they are scaled, so that the ratio
         to the gains of the rules in ``control.torque_loop`` stays the same.
         """
-        problem, count, scenario = self.problem, pressure.size, self.problem.scenario
-        columns = {path: np.full(count, number) for path, number in valve.numbers.items()}
-        columns |= {path: columns[path] * opening for path in _OPENINGS if path in columns}
+        problem, scenario = self.problem, self.problem.scenario
+        columns = {
+            path: np.full(pressure.size, number * (opening if path in _OPENINGS else 1.0))
+            for path, number in valve.items()
+        }
         columns |= {"supply.pressure": pressure, "supply.dorsiflexion_pressure": pressure}
         links = gain_links(LoopParts(scenario.device, LawSignals()), CONTROLLERS[scenario.controller.kind])
 
@@ -290,76 +322,69 @@ def size_for_profile(problem: SizingProblem, threads: int | None, report: Report
     Raises StudyError if all runs fail.
     """
     started = time.perf_counter()
-    trials = Trials(problem, threads)
-    sized = []
-    for count, valve in enumerate(problem.valves):
+    trials, valves = Trials(problem, threads), list[SizedValve]()
+    for name in problem.valves:
         elapsed = time.perf_counter() - started
-        report(Progress(f"trying {valve.name}", count, len(problem.valves), 0, 0, elapsed, "valves"))
-        sized.append(_size_valve(trials, valve))
-    working = [(each.bottle.mass, each.gas, row) for row, each in enumerate(sized) if each.works and each.bottle]
+        report(Progress(f"trying {name}", len(valves), len(problem.valves), 0, 0, elapsed, "valves"))
+        valves.append(_size_valve(trials, name))
+    lasting = [(each.bottle.mass, each.gas, row) for row, each in enumerate(valves) if each.bottle]
     # Of valves with the same bottle the one that uses least gas.
-    choice, recording = (sized[min(working)[2]] if working else None), None
+    choice, recording = (valves[min(lasting)[2]] if lasting else None), None
     if choice is not None:
-        columns = trials.columns(choice.valve, np.array([choice.pressure]), np.array([0]), np.ones(1))
+        columns = trials.columns(problem.valves[choice.name], np.array([choice.pressure]), np.array([0]))
         numbers = {path: float(values[0]) for path, values in columns.items()} | dict(choice.gains)
         recording = simulate(with_numbers(problem.scenario, numbers)).recording
-    return Sizing(problem, tuple(sized), choice, recording, trials.runs, dict(trials.failures), trials.seeds.size)
+    return Sizing(problem, tuple(valves), choice, recording, trials.runs, dict(trials.failures), trials.seeds.size)
 
 
-@in_units(lambda trials, _valve: trials.problem.scenario.device.shown)
-def _size_valve(trials: Trials, valve: CandidateValve) -> SizedValve:
+@in_units(lambda trials, _name: trials.problem.scenario.device.shown)
+def _size_valve(trials: Trials, name: str) -> SizedValve:
     """Return a valve sized at the pressure with the smallest bottle, or at the smallest error if no pressure works."""
-    problem, tried = trials.problem, try_pressures(trials, valve)
-    works = works_in(problem, tried)
-    lowest, limit = first_of(works), limit_of(trials, valve, tried)
-    in_all = tried["gas"] * problem.repetitions * (1.0 + problem.reserve)
+    problem, valve = trials.problem, trials.problem.valves[name]
+    tried = try_pressures(trials, name)
+    works, in_all = tried["works"], tried["gas"] * problem.repetitions * (1.0 + problem.reserve)
     bottles = [smallest_bottle(problem.bottles, gas) for gas in in_all.tolist()]
-    if lowest is None:
-        # The smallest error; argmin would take a failed run, whose error is nan.
-        chosen = int(np.argmin(np.where(np.isnan(tried["error"]), np.inf, tried["error"])))
-    else:
-        # The smallest bottle at the lowest pressure; without any bottle, the lowest pressure that works.
+    # The smallest error, where a failed run has none, or the smallest bottle at the lowest pressure that works.
+    measure = np.where(np.isnan(tried["error"]), np.inf, tried["error"])
+    if works.any():
         masses = np.where(works, [np.inf if bottle is None else bottle.mass for bottle in bottles], np.inf)
-        chosen = int(np.argmin(masses)) if np.isfinite(masses).any() else lowest
-    pressure, error, gas, gains = tried[chosen].tolist()
-    gas_in_all, bottle, remarks, margins = float(in_all[chosen]), None, list[str](), dict[str, float | None]()
-    if lowest is not None:
-        bottle, is_cold = lasting_bottle(problem, gas, gas_in_all, pressure)
-        if (failing := np.flatnonzero(~works[lowest:])).size:
-            text = PRESSURE.text(float(tried["pressure"][lowest + failing[0]]))
-            remarks.append(f"at {text} the error limit is exceeded again")
+        measure = masses if np.isfinite(masses).any() else ~works
+    chosen = int(np.argmin(measure))
+    pressure, error, gas, gains, _ = tried[chosen].tolist()
+    lowest, bottle, remarks, margins = None, None, list[str](), dict[str, float | None]()
+    if works.any():
+        lowest = float(tried["pressure"][works][0])
+        bottle, is_cold = lasting_bottle(problem, gas, float(in_all[chosen]), pressure)
+        if (failing := tried["pressure"][~works & (tried["pressure"] > lowest)]).size:
+            remarks.append(f"at {PRESSURE.text(float(failing[0]))} the error limit is exceeded again")
         if is_cold:
             smaller = " smaller" * (bottle is not None)
             remarks.append(f"a{smaller} bottle has enough gas, but gets too cold before the end")
         if bottles[chosen] is None:
-            largest, share = problem.bottles[-1].name, problem.bottles[-1].mass / gas_in_all
+            largest, share = problem.bottles[-1].name, problem.bottles[-1].mass / float(in_all[chosen])
             duration = f"{100.0 * share:.0f} % of the use, {share * problem.repetitions:.0f} repetitions"
             remarks.append(f"no bottle is large enough: {largest} lasts for {duration}")
         used = gas * problem.repetitions
         margins = {
             "error": 1.0 - error / problem.largest_error,
-            "torque": ceiling(problem, pressure) / problem.profile.largest - 1.0,
+            "torque": problem.ceiling(pressure) / problem.profile.largest - 1.0,
             "flow": flow_margin(trials, valve, pressure, gains),
             "gas": None if bottle is None or used <= 0.0 else bottle.mass / used - 1.0,
         }
-    elif limit == "control":
-        said = "no gains were found with which the torque loop follows" if problem.gains else "the loop does not follow"
-        remarks.append(f"{said}: RMS error {TORQUE.text(error)} at best, limit {TORQUE.text(problem.largest_error)}")
-    columns = trials.columns(valve, np.array([pressure]), np.array([gains]), np.ones(1))
+    columns = trials.columns(valve, np.array([pressure]), np.array([gains]))
     return SizedValve(
-        valve=valve,
-        works=lowest is not None,
+        name=name,
         pressure=pressure,
-        lowest_pressure=None if lowest is None else float(tried["pressure"][lowest]),
+        lowest_pressure=lowest,
         gains={path: float(columns[path][0]) for path in problem.gains},
         error=error,
         gas=gas,
-        gas_in_all=gas_in_all,
+        gas_in_all=float(in_all[chosen]),
         bottle=bottle,
         margins=margins,
-        limit=limit,
+        limit=limit_of(trials, valve, tried),
         remark="; ".join(remarks),
-        curve=(tried["pressure"], tried["error"], tried["gas"]),
+        tried=tried,
     )
 
 
@@ -382,55 +407,41 @@ def lasting_bottle(problem: SizingProblem, gas: float, in_all: float, pressure: 
     schedule = Schedule(problem.repetitions * period + 1.0, 0.0, max(problem.repetitions * period, 1.0))
     for number, bottle in enumerate(enough):
         full = replace(bottle, regulator=bottle.regulator._replace(set_pressure=pressure))
-        try:
-            ended = discharge(full, gas, period, gas / period, schedule).ending
-        except ParameterError:
-            # Its regulator does not pass the flow even when it is full.
-            continue
-        if ended == TIME_IS_UP:
-            return bottle, number > 0
+        # A regulator may not pass the flow even when its bottle is full.
+        with contextlib.suppress(ParameterError):
+            if discharge(full, gas, period, gas / period, schedule).ending == TIME_IS_UP:
+                return bottle, number > 0
     return None, bool(enough)
 
 
-def try_pressures(trials: Trials, valve: CandidateValve) -> Trial:
+def try_pressures(trials: Trials, name: str) -> Trial:
     """Search the lowest feasible pressure of a valve to 0.1 psi; returns the best trial at each pressure tried.
 
     Gains of the next scale are tried unless the torque or the requested range limits the valve.
     """
-    problem, best, reached = trials.problem, None, (np.inf, np.inf)
+    problem, valve, found = trials.problem, trials.problem.valves[name], list[tuple[float, float, int, Trial]]()
     pressures = np.linspace(problem.lowest_pressure, problem.highest_pressure, GRID)
     for first in range(0, len(trials.gain_sets), trials.combinations):
         tried = trials.best(valve, pressures, like=first)
-        while lowest := first_of(works_in(problem, tried)):
+        while lowest := int(tried["works"].argmax()):
             lower, upper = tried["pressure"][lowest - 1 : lowest + 1]
             if upper - lower <= FINENESS:
                 break
             # Without both ends, which were tried before.
             between = trials.best(valve, np.linspace(lower, upper, GRID)[1:-1], like=first)
             tried = np.sort(np.concatenate([tried, between]), order="pressure", kind="stable")
-        feasible = float(np.min(tried["pressure"][works_in(problem, tried)], initial=np.inf))
-        rank = feasible, float(np.nan_to_num(tried["error"], nan=np.inf).min())
-        if best is None or rank < reached:
-            best, reached = tried, rank
+        feasible = float(np.min(tried["pressure"][tried["works"]], initial=np.inf))
+        found.append((feasible, float(np.nan_to_num(tried["error"], nan=np.inf).min()), first, tried))
         if _limit_of_pressure(problem, tried) is not None:
             break
-    if best is None or np.isnan(best["error"]).all():
+    best = min(found, key=lambda each: each[:3])[3]
+    if np.isnan(best["error"]).all():
         reason = next(iter(trials.failures), "no reason was given")
-        raise StudyError(f"{problem.file}: every run with valve '{valve.name}' failed; the first failure: {reason}")
+        raise StudyError(f"{problem.file}: every run with valve '{name}' failed; the first failure: {reason}")
     return best
 
 
-def works_in(problem: SizingProblem, tried: Trial) -> NDArray[np.bool_]:
-    """Return a mask of the trials that keep the error limit and provide the required share of the peak torque."""
-    return np.asarray((tried["error"] <= problem.largest_error) & (tried["pressure"] >= peak_pressure(problem)))
-
-
-def first_of(members: NDArray[np.bool_]) -> int | None:
-    """Return the index of the first true element; None if all are false."""
-    return int(members.argmax()) if members.any() else None
-
-
-def limit_of(trials: Trials, valve: CandidateValve, tried: Trial) -> Limit:
+def limit_of(trials: Trials, valve: Numbers, tried: Trial) -> Limit:
     """Return the quantity that limits a valve at lower pressures, or at every pressure if no pressure is feasible.
 
     The limit is the torque if the lowest feasible pressure is near ``ceiling_pressure``. Otherwise a valve without lag,
@@ -440,14 +451,14 @@ def limit_of(trials: Trials, valve: CandidateValve, tried: Trial) -> Limit:
     problem = trials.problem
     if (known := _limit_of_pressure(problem, tried)) is not None:
         return known
-    first = first_of(works_in(problem, tried))
-    pressure = np.array([0.5 * (float(tried["pressure"][-1 if first is None else first]) + ceiling_pressure(problem))])
-    at_once = replace(valve, numbers={**valve.numbers, **dict.fromkeys(LAGS & valve.numbers.keys(), 0.0)})
-    is_slow = at_once.numbers != valve.numbers
-    for part, opening in [(at_once, 1.0)] * is_slow + [(valve, wider) for wider in WIDER]:
+    pressure = np.array([0.5 * (_lowest_or_highest(tried) + ceiling_pressure(problem))])
+    at_once = {path: 0.0 if path in LAGS else number for path, number in valve.items()}
+    changes: list[tuple[Limit, Numbers, float]] = [("control", at_once, 1.0)] if at_once != valve else []
+    changes += [("flow", valve, wider) for wider in WIDER]
+    for limit, part, opening in changes:
         for first in range(0, len(trials.gain_sets), trials.combinations):
             if trials.best(part, pressure, opening, first)["error"][0] <= problem.largest_error:
-                return "flow" if part is valve else "control"
+                return limit
     return "control"
 
 
@@ -456,30 +467,34 @@ def _limit_of_pressure(problem: SizingProblem, tried: Trial) -> Limit | None:
 
     There is no limit if the lowest requested pressure works ('pressure').
     """
-    first = first_of(works_in(problem, tried))
-    if first == 0:
+    if tried["works"][0]:
         return "pressure"
-    gauge = float(tried["pressure"][-1 if first is None else first]) - problem.atmosphere
+    gauge = _lowest_or_highest(tried) - problem.atmosphere
     return "torque" if gauge <= NEAR_CEILING * (ceiling_pressure(problem) - problem.atmosphere) else None
+
+
+def _lowest_or_highest(tried: Trial) -> float:
+    """Return the lowest pressure that works, or the highest if none does [Pa absolute]."""
+    return float(tried["pressure"][tried["works"].argmax() if tried["works"].any() else -1])
 
 
 def ceiling_pressure(problem: SizingProblem) -> float:
     """Return the pressure [Pa absolute] below which the clipped peak alone exceeds the error limit; equation (2)."""
     from scipy.optimize import brentq
 
-    atmosphere = problem.atmosphere
-    uncut = atmosphere + problem.profile.largest / problem.torque_constant
-    for_peak = peak_pressure(problem)
+    atmosphere, for_peak = problem.atmosphere, peak_pressure(problem)
     # A limit that is kept without any torque has no root: brentq needs a change of sign.
     if cut_error(problem, atmosphere) <= problem.largest_error:
         return for_peak
+    uncut = atmosphere + problem.profile.largest / problem.scenario.device.actuator.torque_constant
     root = float(brentq(lambda pressure: cut_error(problem, pressure) - problem.largest_error, atmosphere, uncut))
     return max(root, for_peak)
 
 
 def peak_pressure(problem: SizingProblem) -> float:
     """Return the pressure [Pa absolute] for the required share of the peak torque; equation (2)."""
-    return problem.atmosphere + LEAST_PEAK * problem.profile.largest / problem.torque_constant
+    torque_constant = problem.scenario.device.actuator.torque_constant
+    return problem.atmosphere + LEAST_PEAK * problem.profile.largest / torque_constant
 
 
 def cut_error(problem: SizingProblem, pressure: float) -> float:
@@ -487,16 +502,11 @@ def cut_error(problem: SizingProblem, pressure: float) -> float:
     # The end of a period is its start again and must count once.
     # Two thousand points: the crest of a push-off, a tenth of a stride, still has two hundred.
     time = np.linspace(0.0, problem.profile.period, 2001)[:-1]
-    torque, largest = problem.profile.at(time), ceiling(problem, pressure)
+    torque, largest = problem.profile.at(time), problem.ceiling(pressure)
     return float(np.sqrt(np.mean((torque - np.clip(torque, -largest, largest)) ** 2)))
 
 
-def ceiling(problem: SizingProblem, pressure: float) -> float:
-    """Return the largest static torque [N m] at a supply pressure [Pa absolute]; equation (2) of the paper."""
-    return problem.torque_constant * (pressure - problem.atmosphere)
-
-
-def flow_margin(trials: Trials, valve: CandidateValve, pressure: float, like: int) -> float:
+def flow_margin(trials: Trials, valve: Numbers, pressure: float, like: int) -> float:
     """Return the possible reduction of the opening [-] at a gauge pressure one tenth higher, with the best gains.
 
     Gains have the scale of the gain set ``like``. At the lowest feasible pressure itself no reduction is possible.
@@ -519,19 +529,18 @@ def flow_margin(trials: Trials, valve: CandidateValve, pressure: float, like: in
 def finding_of(sizing: Sizing) -> Finding[Sizing]:
     """Return a sizing study as a finding; not passed if there is no suggestion."""
     problem, profile = sizing.problem, sizing.problem.profile
-    sizing = replace(sizing, summary=suggestion_sentence(sizing))
     knots = f", {profile.knot_times.size} knots, to {TORQUE.text(profile.table_error)}" if profile.table_error else ""
     requirements = (
         f"profile of {TIME.text(profile.period, '.3g')} with up to {TORQUE.text(profile.largest)} "
         f"({_ORIGINS[profile.kind]}{knots}); {problem.repetitions:.0f} repetitions ({problem.hours:.2g} h), RMS error "
         f"at most {TORQUE.text(problem.largest_error)}, {100 * problem.reserve:.0f} % of the gas as reserve"
     )
-    remarks = [f"{sized.valve.name}: {sized.remark}" for sized in sizing.valves if sized.remark]
+    remarks = [f"{sized.name}: {sized.remark}" for sized in sizing.valves if sized.remark]
     return Finding(
         name="design",
         kicker="Sizing study",
         title=problem.name,
-        said=[*([problem.description] if problem.description and not problem.asked_profile else []), requirements],
+        said=[*([problem.description] if problem.description else []), requirements],
         parts=(
             *_tables(sizing),
             Section(remarks=(sizing.summary, *remarks)),
@@ -566,68 +575,32 @@ def _tables(sizing: Sizing) -> tuple[Section, Section]:
     gas, fraction = Kind("", "kg", "gas mass", ".3g"), Kind(quantity="fraction", form=".0f")
     quantities = CONTROLLERS[sizing.problem.scenario.controller.kind].quantities
     units = {f"controller.{quantity.name}": quantity.unit for quantity in quantities}
-    rows, margins, marked = list[Any](), list[Any](), (list[int](), list[int]())
-    for row, sized in enumerate(sizing.valves):
+    rows, margins, working = list[Any](), list[Any](), [sized for sized in sizing.valves if sized.works]
+    for sized in sizing.valves:
         if not sized.works:
-            error = f"{TORQUE.number(sized.error)} at best"
-            rows.append((sized.valve.name, None, None, error, *(None,) * 3, sized.limit))
+            rows.append((sized.name, None, None, f"{TORQUE.number(sized.error)} at best", *(None,) * 3, sized.limit))
             continue
-        if sized is sizing.choice:
-            marked = ([row], [len(margins)])
         bottle = "none" if sized.bottle is None else sized.bottle.name
         found = (sized.pressure, sized.lowest_pressure, sized.error, sized.gas, sized.gas_in_all)
-        rows.append((sized.valve.name, *found, bottle, sized.limit))
+        rows.append((sized.name, *found, bottle, sized.limit))
         gains = (
             f"{path.rpartition('.')[2].replace('_', ' ')} {gain:.3g} {units[path]}"
             for path, gain in sized.gains.items()
         )
-        margins.append((sized.valve.name, *sized.margins.values(), ", ".join(gains) or "none to choose"))
+        margins.append((sized.name, *sized.margins.values(), ", ".join(gains) or "none to choose"))
     pressures, gases = (("pressure", PRESSURE), ("lowest", PRESSURE)), (("gas per repetition", gas), ("total gas", gas))
     head = ("valve", *pressures, ("RMS error", TORQUE), *gases, "bottle", "limited by")
     fractions = [(f"{name} margin", fraction) for name in ("error", "torque", "flow", "gas")]
+    chosen, kept = ([row for row, each in enumerate(of) if each is sizing.choice] for of in (sizing.valves, working))
     return (
-        Section("Valves", columns_of(head, rows), marked=marked[0]),
-        Section("Margins" if margins else "", columns_of(("valve", *fractions, "gains"), margins), marked=marked[1]),
+        Section("Valves", columns_of(head, rows), marked=chosen),
+        Section("Margins" if margins else "", columns_of(("valve", *fractions, "gains"), margins), marked=kept),
     )
-
-
-def suggestion_sentence(sizing: Sizing) -> str:
-    """Return a sentence with the suggestion and its reason, or the reason why there is none."""
-    choice, recording, profile = sizing.choice, sizing.recording, sizing.problem.profile
-    if choice is None or recording is None:
-        working = [sized for sized in sizing.valves if sized.works]
-        kept = "valves keep the error limit, but no bottle lasts for the requested use"
-        near = min(sizing.valves, key=lambda sized: np.nan_to_num(sized.error, nan=np.inf))
-        nearest = f"{TORQUE.text(near.error)} with {near.valve.name} at {PRESSURE.text(near.pressure)}"
-        reasons = [kept if working else f"no valve keeps the error limit; the smallest error is {nearest}"]
-        reasons += [f"{each.valve.name}{cut}" for each in working or sizing.valves if (cut := _cut_peak(sizing, each))]
-        return f"no suggestion: {'; '.join(reasons)}"
-    bottle = "" if choice.bottle is None else f" and {choice.bottle.name}"
-    short = [
-        f"{TORQUE.number(sign * reached)} of {TORQUE.text(sign * peak)}"
-        for sign in (1.0, -1.0)
-        if (peak := np.max(sign * profile.knot_values)) > _WHOLE_PEAK * profile.largest
-        and (reached := np.max(sign * recording["torque"])) < REACHED * peak
-    ]
-    reaches = f"; reaches {' and '.join(short)} in the simulated run" * bool(short)
-    return (
-        f"suggested: {choice.valve.name} at {PRESSURE.text(choice.pressure)}{bottle}, the smallest that lasts "
-        f"and keeps the error limit{_cut_peak(sizing, choice)}{reaches}; a lower pressure is prevented by "
-        f"{LIMITS[choice.limit]}"
-    )
-
-
-def _cut_peak(sizing: Sizing, sized: SizedValve) -> str:
-    """Return the fraction of the peak torque that a valve's pressure cuts off; "" for a whole peak."""
-    largest, most = sizing.problem.profile.largest, ceiling(sizing.problem, sized.pressure)
-    if (cut := 1.0 - most / largest) <= _WHOLE_PEAK or sized.error != sized.error:
-        return ""
-    return f", with {100.0 * cut:.0f} % of the peak cut off (at most {TORQUE.text(most)} of {TORQUE.text(largest)})"
 
 
 def _colours(sizing: Sizing) -> dict[str, str]:
     """Return the colour of each valve's curves by name."""
-    return {sized.valve.name: colour for sized, colour in zip(sizing.valves, cycle(COLOURS), strict=False)}
+    return dict(zip(sizing.problem.valves, cycle(COLOURS), strict=False))
 
 
 def _pressure_panels(sizing: Sizing) -> list[Panel]:
@@ -638,23 +611,20 @@ def _pressure_panels(sizing: Sizing) -> list[Panel]:
     errors, gases = [Mark("level", (), limit, colour=BLACK, style={"linewidth": 1.0, "linestyle": "--"})], list[Mark]()
     rings = list[Mark]()
     for sized in sizing.valves:
-        (pressure, error, gas), colour = sized.curve, colours[sized.valve.name]
+        (pressure, error, gas), colour = (
+            (sized.tried[name] for name in ("pressure", "error", "gas")),
+            colours[sized.name],
+        )
         keeps = error <= limit
-        errors.append(Mark("line", pressure, error, (), sized.valve.name, colour, dotted))
-        gases.append(Mark("line", pressure[keeps], gas[keeps], colour=colour, style=dotted))
+        errors.append(Mark("line", pressure, error, (), sized.name, colour, dotted))
+        if keeps.any():
+            gases.append(Mark("line", pressure[keeps], gas[keeps], colour=colour, style=dotted))
         if sized.works:
             label = "" if rings else "chosen pressure"
             rings.append(Mark("line", [sized.pressure], [sized.error], (), label, colour, ringed))
             gases.append(Mark("line", [sized.pressure], [sized.gas], colour=colour, style=ringed))
     error_kind, gas_kind = replace(TORQUE, words="RMS error"), Kind("Gas per repetition", "kg", "gas mass", ".3g")
     highest = float(error_kind.values(_MAXIMUM_OF_LIMIT * limit))
-
-    def set_gas(axes: "Axes") -> None:
-        # Valves differ by some per cent: an axis from 0 would lay their curves on each other.
-        axes.margins(y=0.15)
-        if not any(sized.works for sized in sizing.valves):
-            axes.text(0.5, 0.5, "no valve keeps the limit", transform=axes.transAxes, ha="center", color=GREY)
-
     return [
         Panel(
             PRESSURE,
@@ -664,21 +634,18 @@ def _pressure_panels(sizing: Sizing) -> list[Panel]:
             legend="figure",
             then=methodcaller("set_ylim", 0.0, highest),
         ),
-        Panel(PRESSURE, gas_kind, gases, "Gas, within the limit", then=set_gas),
+        # Valves differ by some per cent: an axis from 0 would lay their curves on each other.
+        Panel(PRESSURE, gas_kind, gases, "Gas, within the limit", then=methodcaller("margins", y=0.15)),
     ]
 
 
 def _torque_panels(sizing: Sizing) -> list[Panel]:
     """Return the panel of the prescribed torque and of the suggestion's over time."""
-    times, choice, recording = (
-        np.linspace(0.0, sizing.problem.scenario.run.duration, 3001),
-        sizing.choice,
-        sizing.recording,
-    )
+    times, choice = np.linspace(0.0, sizing.problem.scenario.run.duration, 3001), sizing.choice
     prescribed = {"linestyle": REFERENCE.line, "linewidth": 1.2}
     marks = [Mark("line", times, sizing.problem.profile.at(times), (), "prescribed", REFERENCE.colour, prescribed)]
-    if choice is not None and recording is not None:
-        label = f"{choice.valve.name} at {PRESSURE.number(choice.pressure, '.3g')} {PRESSURE.axis_unit}"
-        colour = _colours(sizing)[choice.valve.name]
-        marks.append(Mark("line", recording.time, recording["torque"], label=label, colour=colour))
+    if choice is not None and sizing.recording is not None:
+        label = f"{choice.name} at {PRESSURE.number(choice.pressure, '.3g')} {PRESSURE.axis_unit}"
+        colour = _colours(sizing)[choice.name]
+        marks.append(Mark("line", sizing.recording.time, sizing.recording["torque"], label=label, colour=colour))
     return [Panel(TIME, TORQUE, marks, then=lambda axes: axes.margins(x=0.0))]

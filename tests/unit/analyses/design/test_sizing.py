@@ -19,13 +19,11 @@ from ppafo.analyses.design.search import (
     OSCILLATES,
     Sizing,
     Trials,
-    ceiling,
     ceiling_pressure,
     cut_error,
     finding_of,
     lasting_bottle,
     smallest_bottle,
-    suggestion_sentence,
 )
 from ppafo.control.profiles import KNOTS
 from ppafo.errors import PpafoError
@@ -86,7 +84,7 @@ def test_the_pressure_of_the_torque_ceiling_is_the_one_that_the_cut_crest_demand
     problem = sizing.problem
     pressure = ceiling_pressure(problem)
     most = TORQUE_CONSTANT * (pressure - ATMOSPHERE)
-    assert ceiling(problem, pressure) == pytest.approx(most)
+    assert problem.ceiling(pressure) == pytest.approx(most)
     assert cut_error(problem, pressure) == pytest.approx(0.4, rel=1e-6)
     # The crest above a level L: 0.3 s at 4 N m, and two straight flanks that fall away from it.
     flanks = (4.0 - most) ** 3 / 3.0 * (0.3 / 4.0 + 0.2 / 4.0)
@@ -112,7 +110,7 @@ def test_a_sizing_is_drawn_and_told_as_data_like_any_answer(sizing: Sizing) -> N
 def test_a_tenth_of_a_psi_less_is_not_enough(sizing: Sizing) -> None:
     assert sizing.choice is not None
     below = np.array([sizing.choice.lowest_pressure or 0.0]) - 700.0
-    assert Trials(sizing.problem).best(sizing.choice.valve, below)["error"][0] > 0.4
+    assert Trials(sizing.problem).best(sizing.problem.valves[sizing.choice.name], below)["error"][0] > 0.4
 
 
 def test_gas_bottle_and_margins_belong_together(sizing: Sizing) -> None:
@@ -182,7 +180,6 @@ def test_a_valve_too_late_for_any_gains_is_limited_by_the_control(folder: Path) 
     # the root of (4 / 0.3)^2 (0.2 s)^3 / 3 over the second of the run.
     assert item.error > ((4.0 / 0.3) ** 2 * 0.2**3 / 3.0) ** 0.5 > 0.4
     assert (item.works, item.limit) == (False, "control")
-    assert item.remark.startswith("no gains were found with which the torque loop follows: RMS error ")
 
 
 def test_a_valve_that_needs_pressure_only_because_it_slews_is_not_limited_by_its_flow(folder: Path) -> None:
@@ -255,13 +252,13 @@ def test_a_profile_that_is_given_replaces_that_of_the_file_and_its_paths_count_f
     ("text", "said"),
     [
         ("gait:falisse2019-subjct1,mass=70 kg,share=0.1", "did you mean 'falisse2019-subject1'"),
-        ("gait:falisse2019-subject1,mas=70 kg,share=0.1", "did you mean 'mass'?; available: mass, share"),
-        ("gait:falisse2019-subject1,mass=70 kg", "share missing; write for example 'gait:"),
+        ("gait:falisse2019-subject1,mas=70 kg,share=0.1", "did you mean 'mass'"),
+        ("gait:falisse2019-subject1,mass=70 kg", "share"),
         ("gait:falisse2019-subject1,mass=70 kg,mass=80 kg,share=0.1", "give mass and share once"),
         ("gait:falisse2019-subject1,mass=70,share=0.1", "kg"),
         ("gait:falisse2019-subject1,mass=70 kg,share=1.1", "at most 1"),
-        ("gait:falisse2019-subject1,mass=70 kg,share=0", "above 0"),
-        ("gait:falisse2019-subject1,mass=1 g,share=0.1", "from 1 to 500 kg"),
+        ("gait:falisse2019-subject1,mass=70 kg,share=0", "more than 0"),
+        ("gait:falisse2019-subject1,mass=1 g,share=0.1", "at most 500000 g"),
     ],
 )
 def test_a_text_that_is_no_share_of_a_moment_is_one_line_with_what_is_allowed(text: str, said: str) -> None:
@@ -371,7 +368,8 @@ def test_a_limit_is_kept_in_every_noise_stream_and_the_seed_of_the_scenario_deci
     for seed in (1, 2):
         noisy = dataclasses.replace(problem.scenario.sensors, pressure_noise=1000.0, seed=seed)
         own = dataclasses.replace(problem, scenario=dataclasses.replace(problem.scenario, sensors=noisy))
-        found.append(Trials(own).run(problem.valves[0], np.full(3, 5e5), np.zeros(3, dtype=np.intp), np.ones(3)))
+        valve = problem.valves["enfield-ls-v05s"]
+        found.append(Trials(own).run(valve, np.full(3, 5e5), np.zeros(3, dtype=np.intp)))
     streams = np.array([np.random.default_rng(int(seed)).random() for seed in np.unique(seen[0])])
     assert streams.size == 16
     assert found[0]["error"] == pytest.approx(np.full(3, streams.max()))
@@ -387,7 +385,7 @@ def test_a_trial_whose_loop_oscillates_is_no_design_however_small_its_error_is(s
     factors = tuple(number / gain for number in (0.02, 1.0, 8.0))
     gains = ("controller.proportional_gain",)
     trials = Trials(dataclasses.replace(sizing.problem, scenario=scenario, gains=gains, gain_factors=factors))
-    found = trials.run(sizing.problem.valves[0], np.full(3, 4.5e5), np.arange(3), np.ones(3))
+    found = trials.run(sizing.problem.valves["enfield-ls-v05s"], np.full(3, 4.5e5), np.arange(3))
     assert np.isfinite(found["error"]).tolist() == [True, True, False]
     assert (trials.runs, trials.failures) == (3, {OSCILLATES: 1})
 
@@ -406,7 +404,7 @@ def test_a_pressure_that_cuts_half_of_the_peak_is_not_suggested(tmp_path: Path) 
     assert sizing.choice.margins["torque"] >= -0.3
     # Equation (2): the peak of 5 N m needs 5 N m / 14.51 cm^3 = 344.6 kPa, 50 psi above the atmosphere.
     most = TORQUE_CONSTANT * (sizing.choice.pressure - ATMOSPHERE)
-    assert f"% of the peak cut off (at most {most:.3g} N m of 5 N m)" in suggestion_sentence(sizing)
+    assert f"% of the peak cut off (at most {most:.3g} N m of 5 N m)" in sizing.summary
 
 
 def recorded_torques(sizing: Sizing) -> list[float]:
@@ -430,8 +428,8 @@ def test_a_suggested_run_that_stays_below_a_peak_of_either_sign_says_so(tmp_path
     torques = recorded_torques(both)
     assert 0.0 < max(torques) < 0.95 * 8.0
     assert -0.95 * 8.0 < min(torques) < 0.0
-    reaches = f"; reaches {max(torques):.3g} of 8 N m and {min(torques):.3g} of -8 N m in the simulated run; "
-    assert reaches in suggestion_sentence(both)
+    reaches = f"; reaches {max(torques):.3g} of 8 N m and {min(torques):.3g} of -8 N m in the simulated run"
+    assert reaches in both.summary
 
 
 def test_a_bottle_with_gas_enough_that_gets_too_cold_is_not_suggested() -> None:
