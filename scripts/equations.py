@@ -141,7 +141,7 @@ def outcome(case: dict[str, Any]) -> dict[str, Any]:
         found["exported"] = subprocess.run(words, capture_output=True, check=False).returncode == 0
     if "linear" in case:
         model = linear_model(scenario, case["linear"])
-        found["linear"] = [np.asarray(matrix).tolist() for matrix in (model.a, model.b, model.c, model.d)]
+        found["linear"] = [np.asarray(matrix).tolist() for matrix in (model.A, model.B, model.C, model.D)]
     if case.get("solver", True):
         agreement = compare_with_reference(run)
         found["apart"] = max(agreement.angle / 2e-4, agreement.pressure_1 / 1e-3, agreement.pressure_2 / 1e-3)

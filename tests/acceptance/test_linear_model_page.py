@@ -32,7 +32,6 @@ def test_the_margins_hold_for_changes_of_the_size_that_the_page_states() -> None
     assert all(f"{size} N m" in TEXT for size in ("-0.003", "-0.01", "-0.1"))
     task = "torque-task-proportional"
     model = ppafo.linearise(task, overrides=["reference.level=3 N m"]).found
-    at = {state.name: state.value for state in model.states}
     # The gains of the paper.
     gains = {"proportional_gain": 0.095, "integral_gain": 0.25, "derivative_gain": 0.006}
 
@@ -40,7 +39,7 @@ def test_the_margins_hold_for_changes_of_the_size_that_the_page_states() -> None
         changed = {f"controller.{name}": share * model.margins.gain_margin * gain for name, gain in gains.items()}
         level = {"reference.kind": "constant", "reference.level": 3.0 + step}
         scenario = ppafo.load_scenario(task, {**changed, **level})
-        still = replace(scenario.initial, pressure_1=at["pressure_1"], pressure_2=at["pressure_2"])
+        still = replace(scenario.initial, pressure_1=model.values["pressure_1"], pressure_2=model.values["pressure_2"])
         return float(ppafo.simulate(replace(scenario, initial=still)).metrics["command_reversals"])
 
     assert [reversals(0.96, -0.003), reversals(0.8, -0.01), reversals(0.8, -0.03)] == [0.0, 0.0, 0.0]

@@ -47,4 +47,4 @@ def test_a_plant_is_linear_near_a_moment_of_a_run_of_an_angle_or_a_pressure(scen
         with pytest.raises(ppafo.ScenarioError, match="give a time of the run, such as at='1 s'"):
             ppafo.linearise(scenario)
     model = ppafo.linearise(scenario, at="0.2 s").found
-    assert model.a.shape[0] == len(model.states)
+    assert model.A.shape[0] == len(model.states)

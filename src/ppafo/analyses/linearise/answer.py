@@ -1,13 +1,12 @@
 """Report of a linear model: operating point, side of each limit, poles, margins, matrices and range of validity."""
 
-import io
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.analyses.linearise.model import PID_LAWS, LinearModel, open_loop
+from ppafo.analyses.linearise.model import PID_LAWS, UNITS, LinearModel, open_loop
 from ppafo.control.controllers.switching import CONSTANT
 from ppafo.engine.lanes import Floats
 from ppafo.report.finding import Finding, Section, columns_of, facts
@@ -18,7 +17,6 @@ from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.scenario import Control, with_control
 from ppafo.simulation.simulate import simulate_many
 from ppafo.units.shown import in_units, quantity_of_unit
-from ppafo.wording import count_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,13 +52,10 @@ _STEPS_CAPTION = (
 @in_units(lambda model: model.scenario.device.shown)
 def finding_of(model: LinearModel) -> Finding[LinearModel]:
     """Return a linear model as a finding with sentences, tables and panels."""
-    title = (
-        f"Linear model of {model.scenario.name}, {'in its steady state' if model.is_steady else f'at {model.time:g} s'}"
-    )
-    named = (("state", model.states), ("input", model.inputs), ("output", model.outputs))
-    size = ", ".join(count_of(len(signals), noun) for noun, signals in named)
-    sentences = [f"plant without controller and sensors: {size}; deviations from the operating point in SI units"]
-    if not model.is_steady:
+    when = "in its steady state" if model.time is None else f"at {model.time:g} s"
+    title = f"Linear model of {model.scenario.name}, {when}"
+    sentences = ["plant without controller and sensors: deviations from the operating point in SI units"]
+    if model.time is not None:
         sentences.append(
             "the operating point is not a steady state: the model describes small deviations from the run and is valid "
             "only while the run stays near this point"
@@ -78,19 +73,18 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
                 "flow into the chamber is left, and gains and margins hold for very small changes only"
             )
     kinks = [
-        f"the plant is not differentiable at this point: the column of `{name}` is valid only {side} "
-        f"{model.values[name]:.5g}; the derivative {'below' if side == 'above' else 'above'} this value differs"
+        f"the plant is not differentiable at this point: the column of `{name}` is valid only {side} its value"
         for name, side in model.edges.items()
     ]
     matrices = []
     for name, values, rows, columns in (
-        ("A", model.a, model.states, model.states),
-        ("B", model.b, model.states, model.inputs),
-        ("C", model.c, model.outputs, model.states),
-        ("D", model.d, model.outputs, model.inputs),
+        ("A", model.A, model.states, model.states),
+        ("B", model.B, model.states, model.inputs),
+        ("C", model.C, model.outputs, model.states),
+        ("D", model.D, model.outputs, model.inputs),
     ):
-        titles: list[str | tuple[str, Kind]] = ["", *((signal.name, Kind(form=".5g")) for signal in columns)]
-        cells = [(signal.name, *row) for signal, row in zip(rows, values.tolist(), strict=True)]
+        titles: list[str | tuple[str, Kind]] = ["", *((name, Kind(form=".5g")) for name in columns)]
+        cells = [(name, *row) for name, row in zip(rows, values.tolist(), strict=True)]
         matrices.append(Section(f"Matrix {name} (SI)", columns_of(titles, cells)))
     validity = Section(
         "Range of validity",
@@ -115,19 +109,19 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
             *([validity] if can_step(model) else []),
         ],
         found=model,
-        files={"linearise.npz": partial(_arrays, model)},
         overrides=changes_in(model.scenario),
     )
 
 
 def _point(model: LinearModel) -> Section:
     """Return the table of states, inputs and outputs at the operating point; states are not repeated as outputs."""
-    outputs = [signal for signal in model.outputs if signal not in model.states]
+    outputs = [name for name in model.outputs if name not in model.states]
     rows = []
-    for role, signals in (("state", model.states), ("input", model.inputs), ("output", outputs)):
-        for name, unit, value in ((signal.name, signal.unit, signal.value) for signal in signals):
+    for role, names in (("state", model.states), ("input", model.inputs), ("output", outputs)):
+        for name in names:
+            unit = UNITS[name]
             kind = Kind("", "" if unit == "1" else unit, quantity_of_unit(unit), ".5g")
-            rows.append((role, name, unit, kind.text(value)))
+            rows.append((role, name, unit, kind.text(model.values[name])))
     return Section("The point", columns_of(("", "name", "unit in the model", "at the point"), rows), left=3)
 
 
@@ -150,7 +144,7 @@ def _poles(model: LinearModel, title: str) -> Section:
         "Poles",
         columns_of(("pole (1/s)", ("time constant", constant), ("frequency", frequency), ratio), rows),
         panels=partial(frequency_panels, model),
-        name="frequency-response" if np.any(model.b[:, 0]) or np.any(model.d[:, 0]) else "",
+        name="frequency-response" if np.any(model.B[:, 0]) or np.any(model.D[:, 0]) else "",
         caption=_FREQUENCY_CAPTION,
         size=(5.4, 2.2),
         title=title,
@@ -253,91 +247,59 @@ def frequency_panels(model: LinearModel) -> list[Panel]:
 # Range of validity: steps of the command from the steady state, on the runs and of the model.
 
 
-class StepResponses(NamedTuple):
-    """Torque changes after steps of the command: of the nonlinear runs, of the linear model, and their differences.
-
-    Step heights ``amplitudes`` [-] (steps,), ``times`` [s], ``runs`` and ``linear`` [N m] (steps, times), largest
-    difference ``errors`` and largest change of the runs ``sizes`` [N m] (steps,).
-    """
-
-    amplitudes: Floats
-    times: Floats
-    runs: Floats
-    linear: Floats
-    errors: Floats
-    sizes: Floats
-
-
 def can_step(model: LinearModel) -> bool:
     """True if runs can start at the operating point: steady gas states, locked ankle, valve state equal to the command.
 
     The command must also stay below full opening for the largest step, 0.3 times the steady command.
     """
     is_locked = model.scenario.motion.locked_angle is not None
-    has_gas_alone = all(signal.name.startswith("pressure") for signal in model.states)
-    return model.is_steady and is_locked and has_gas_alone and 0.0 < abs(model.values["command"]) < _LARGEST_COMMAND
+    has_gas_alone = all(name.startswith("pressure") for name in model.states)
+    return model.time is None and is_locked and has_gas_alone and 0.0 < abs(model.values["command"]) < _LARGEST_COMMAND
 
 
-def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> StepResponses:
-    """Return the torque responses to steps of the command by fractions of its steady value [-].
+def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> tuple[Floats, Floats, Floats]:
+    """Return step heights of the command [-] (steps,), and torque changes of runs and model [N m] (steps, times).
 
-    The model must satisfy ``can_step``.
+    The steps are fractions of the steady command; the model must satisfy ``can_step``.
     """
     from scipy.signal import StateSpace, step
 
-    command = model.values["command"]
-    times: Floats = INTERVAL * np.arange(round(DURATION / INTERVAL) + 1, dtype=np.float64)
-    start = {state.name: state.value for state in model.states if state.name.startswith("pressure")}
+    command, run = model.values["command"], model.scenario.run
     held = replace(
         model.scenario,
-        run=replace(model.scenario.run, duration=DURATION, step=INTERVAL, output_interval=INTERVAL),
-        initial=replace(model.scenario.initial, **start),
+        run=replace(run, duration=DURATION, step=INTERVAL, output_interval=INTERVAL),
+        initial=replace(model.scenario.initial, **{name: model.values[name] for name in model.states}),
     )
     laws = (Control(CONSTANT.name, {"command": command * (1.0 + share)}, INTERVAL) for share in (0.0, *shares))
     results = simulate_many([with_control(held, law) for law in laws])
     still, *runs = (result.recording["torque"] for result in results)
     amplitudes: Floats = command * np.array(shares, dtype=np.float64)
     # The command is the first input, the torque the first output.
-    linear = amplitudes[:, None] * step(StateSpace(model.a, model.b[:, :1], model.c[:1], model.d[:1, :1]), T=times)[1]
-    changes = np.array(runs) - still
-    errors, sizes = (np.max(np.abs(difference), axis=1) for difference in (changes - linear, changes))
-    return StepResponses(amplitudes, times, changes, linear, errors, sizes)
+    plant = StateSpace(model.A, model.B[:, :1], model.C[:1], model.D[:1, :1])
+    return amplitudes, np.array(runs) - still, amplitudes[:, None] * step(plant, T=INTERVAL * np.arange(still.size))[1]
 
 
 def steps_panels(model: LinearModel) -> list[Panel]:
     """Return panels of step responses, nonlinear and linear, and of their difference divided by the amplitude."""
-    steps = steps_of(model)
-    over_time = []
+    amplitudes, runs, linear = steps_of(model)
+    times, over_time = INTERVAL * np.arange(runs.shape[1]), []
     for number, colour in zip(_DRAWN_STEPS, (BLUE, VERMILION), strict=True):
-        change = steps.runs[number] / steps.amplitudes[number]
         label = f"command {100.0 * SHARES[number]:+.3g} %"
-        over_time.append(Mark("line", steps.times, change, label=label, colour=colour))
-    linear = Mark("line", steps.times, steps.linear[-1] / steps.amplitudes[-1], (), "linear", BLACK, _DASHED)
-    square = steps.errors[0] * (steps.sizes / steps.sizes[0]) ** 2
+        over_time.append(Mark("line", times, runs[number] / amplitudes[number], label=label, colour=colour))
+    over_time.append(Mark("line", times, linear[-1] / amplitudes[-1], (), "linear", BLACK, _DASHED))
+    errors, sizes = (np.max(np.abs(changes), axis=1) for changes in (runs - linear, runs))
+    square = errors[0] * (sizes / sizes[0]) ** 2
     dots = {"linestyle": "", "marker": "o", "markersize": 4}
     per_command = Kind("Change of torque per command", "N m")
     return [
-        Panel(replace(TIME, words="Time after the step"), per_command, [*over_time, linear]),
+        Panel(replace(TIME, words="Time after the step"), per_command, over_time),
         Panel(
             Kind("Largest change of torque in a step", "N m"),
             Kind("Runs less linear model", "N m"),
             [
-                Mark("line", steps.sizes, steps.errors, label="largest difference", style=dots),
-                Mark("line", steps.sizes, square, (), "square of the amplitude", GREY, _DASHED),
+                Mark("line", sizes, errors, label="largest difference", style=dots),
+                Mark("line", sizes, square, (), "square of the amplitude", GREY, _DASHED),
             ],
             then=lambda axes: axes.set(xscale="log", yscale="log"),
         ),
     ]
-
-
-def _arrays(model: LinearModel) -> bytes:
-    """Matrices, names, units and operating point as a NumPy archive."""
-    arrays: dict[str, Any] = {"A": model.a, "B": model.b, "C": model.c, "D": model.d, "rates": model.rates}
-    for kind in ("states", "inputs", "outputs"):
-        variables = getattr(model, kind)
-        arrays[kind] = np.array([variable.name for variable in variables])
-        arrays[f"{kind}_units"] = np.array([variable.unit for variable in variables])
-        arrays[f"{kind}_values"] = np.array([variable.value for variable in variables])
-    archive = io.BytesIO()
-    np.savez(archive, allow_pickle=False, **arrays)
-    return archive.getvalue()

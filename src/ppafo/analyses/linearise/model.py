@@ -3,7 +3,7 @@
 Read downwards: ``linear_model`` takes a point of a run or the steady state, and differences of the plant's rates there.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.util import find_spec
@@ -57,6 +57,7 @@ UNITS = {
     **dict.fromkeys(("supplied_flow", "vented_flow"), "kg/s"),
 }
 """SI units of all signals of a linear model."""
+_SIGNALS = ("states", "inputs", "outputs")
 _SIZES = {"Pa": 1.0e5, "K": 300.0}
 """Reference size for values with a unit [SI]; 1 for any other unit."""
 _SINGULAR = 1.0e13
@@ -88,15 +89,6 @@ _INTEGRATOR = 1.0e-9
 """Magnitude [1/s] up to which a pole counts as an integrator."""
 _ROUNDING = 1.0e-9
 """Tolerance for the rounding of a delay in sample periods [-]."""
-
-
-@dataclass(frozen=True, slots=True)
-class LinearSignal:
-    """State, input or output: name, SI unit, and value at the operating point."""
-
-    name: str
-    unit: str
-    value: float
 
 
 class OmittedDelays(NamedTuple):
@@ -146,8 +138,9 @@ class LinearModel:
     """Linear plant model of a scenario, x' = A x + B u, y = C x + D u, for deviations from the operating point in SI.
 
     ``time``: time of the operating point [s]; None for a steady state
-    ``a`` (states, states), ``b`` (states, inputs), ``c`` (outputs, states), ``d`` (outputs, inputs): matrices, also
-        named as in the equations: ``A``, ``B``, ``C``, ``D``
+    ``states``, ``inputs``, ``outputs``: names of the signals, of which ``UNITS`` has the units
+    ``values``: values of all signals at the operating point [SI], by name
+    ``A`` (states, states), ``B`` (states, inputs), ``C`` (outputs, states), ``D`` (outputs, inputs): matrices
     ``rates`` (states,): x' at the operating point, 0 in a steady state
     ``sides``: side of each limit of the plant, in words
     ``edges``: side on which the model holds, "above" or "below", by name of each state or input at a kink
@@ -158,13 +151,14 @@ class LinearModel:
 
     scenario: Scenario
     time: float | None
-    states: tuple[LinearSignal, ...]
-    inputs: tuple[LinearSignal, ...]
-    outputs: tuple[LinearSignal, ...]
-    a: Floats
-    b: Floats
-    c: Floats
-    d: Floats
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    values: Mapping[str, float]
+    A: Floats
+    B: Floats
+    C: Floats
+    D: Floats
     rates: Floats
     sides: Mapping[str, str]
     edges: Mapping[str, str]
@@ -172,27 +166,10 @@ class LinearModel:
     sent_per_opening: float = 1.0
     margins: LoopMargins | None = None
 
-    def __getattr__(self, name: str) -> Floats:
-        """Matrix under its name in the equations: ``A``, ``B``, ``C`` or ``D``."""
-        if name not in ("A", "B", "C", "D"):
-            raise AttributeError(f"'{type(self).__name__}' object has no attribute '{name}'", name=name, obj=self)
-        matrix: Floats = getattr(self, name.lower())
-        return matrix
-
-    @property
-    def is_steady(self) -> bool:
-        """True if the operating point of the model is a steady state."""
-        return self.time is None
-
-    @property
-    def values(self) -> dict[str, float]:
-        """Values of all states, inputs and outputs at the operating point [SI], by name."""
-        return {signal.name: signal.value for signal in (*self.states, *self.inputs, *self.outputs)}
-
     @property
     def poles(self) -> NDArray[np.complex128]:
         """Poles of the linear model [1/s], the slowest first."""
-        eigenvalues = np.linalg.eigvals(self.a).astype(np.complex128)
+        eigenvalues = np.linalg.eigvals(self.A).astype(np.complex128)
         return eigenvalues[np.argsort(np.abs(eigenvalues))]
 
     def response(self, frequencies: Floats, output: str = "torque", source: str = "command") -> NDArray[np.complex128]:
@@ -200,9 +177,12 @@ class LinearModel:
 
         Raises ScenarioError for an unknown output or input, and for a frequency at which the model has a pole.
         """
-        row, column = _index_of(output, self.outputs, "output"), _index_of(source, self.inputs, "input")
+        for name, names, kind in ((output, self.outputs, "output"), (source, self.inputs, "input")):
+            if name not in names:
+                raise ScenarioError(f"the linear model has no {kind} '{one_line(name)}'{known_names(name, names)}")
+        row, column = self.outputs.index(output), self.inputs.index(source)
         asked = np.asarray(frequencies, dtype=np.float64).ravel()
-        matrices = scaled = 2.0j * np.pi * asked[:, None, None] * np.eye(len(self.states)) - self.a
+        matrices = scaled = 2.0j * np.pi * asked[:, None, None] * np.eye(len(self.states)) - self.A
         # States and their rates differ by powers of ten in SI: rank is taken with rows and columns of one size.
         for axis in (2, 1):
             largest = np.max(np.abs(scaled), axis=axis, keepdims=True, initial=0.0)
@@ -213,12 +193,18 @@ class LinearModel:
                 f"infinite; give another frequency"
             )
         return np.asarray(
-            np.linalg.solve(matrices, self.b[:, column, None])[:, :, 0] @ self.c[row] + self.d[row, column]
+            np.linalg.solve(matrices, self.B[:, column, None])[:, :, 0] @ self.C[row] + self.D[row, column]
         )
 
     def json_document(self) -> dict[str, Any]:
         """Return operating point, matrices, poles and sides as plain data in SI."""
-        rates = self.rates.tolist()
+        signals = {
+            kind: [{"name": name, "unit": UNITS[name], "value": self.values[name]} for name in getattr(self, kind)]
+            for kind in _SIGNALS
+        }
+        signals["states"] = [
+            {**signal, "rate": rate} for signal, rate in zip(signals["states"], self.rates.tolist(), strict=True)
+        ]
         return {
             "format": "ppafo linear model",
             "schema_version": 1,
@@ -226,9 +212,7 @@ class LinearModel:
             "scenario": self.scenario.name,
             "overrides": list(self.scenario.origin.overrides),
             "at": EQUILIBRIUM if self.time is None else self.time,
-            "states": [{**asdict(signal), "rate": rate} for signal, rate in zip(self.states, rates, strict=True)],
-            "inputs": [asdict(signal) for signal in self.inputs],
-            "outputs": [asdict(signal) for signal in self.outputs],
+            **signals,
             **{name: getattr(self, name).tolist() for name in "ABCD"},
             "poles": [{"real": pole.real, "imaginary": pole.imag} for pole in self.poles.tolist()],
             "sides": dict(self.sides),
@@ -246,16 +230,8 @@ class LinearModel:
             raise ScenarioError(MISSING_CONTROL)
         import control
 
-        names = {kind: [signal.name for signal in getattr(self, kind)] for kind in ("states", "inputs", "outputs")}
-        return control.ss(self.a, self.b, self.c, self.d, name=self.scenario.name.replace("-", "_"), **names)
-
-
-def _index_of(name: str, signals: Sequence[LinearSignal], kind: str) -> int:
-    """Index of a signal by name; ``kind`` is the noun for the error message."""
-    names = [signal.name for signal in signals]
-    if name not in names:
-        raise ScenarioError(f"the linear model has no {kind} '{one_line(name)}'{known_names(name, names)}")
-    return names.index(name)
+        names = {kind: list(getattr(self, kind)) for kind in _SIGNALS}
+        return control.ss(self.A, self.B, self.C, self.D, name=self.scenario.name.replace("-", "_"), **names)
 
 
 def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
@@ -619,9 +595,9 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     is_kink = np.any(np.abs(near - far) * sizes > _ON_THE_EDGE * largest + 10.0 * errors * sizes, axis=0)
     near = np.where(np.abs(near) * sizes > _ZERO * largest, near, 0.0)
     count = len(states)
-    a, b, c, d = near[:count, :count], near[:count, count:], near[count:, :count], near[count:, count:]
     in_words = limits_of(scenario, plant, point)
-    if not np.any(b[:, 0]) and not np.any(d[:, 0]):
+    # The command is the first input.
+    if not np.any(near[:, count]):
         in_words["valve"] += f"; {DEAF}"
     sent_per_opening = 1.0
     if run.program.inverts_valve:
@@ -632,13 +608,14 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     model = LinearModel(
         scenario=scenario,
         time=point.time,
-        states=tuple(LinearSignal(name, UNITS[name], values[name]) for name in states),
-        inputs=tuple(LinearSignal(name, UNITS[name], values[name]) for name in plant.inputs),
-        outputs=tuple(LinearSignal(name, UNITS[name], outputs_here[name]) for name in outputs),
-        a=a,
-        b=b,
-        c=c,
-        d=d,
+        states=tuple(states),
+        inputs=plant.inputs,
+        outputs=tuple(outputs),
+        values={name: ({**values, **outputs_here})[name] for name in (*states, *plant.inputs, *outputs)},
+        A=near[:count, :count],
+        B=near[:count, count:],
+        C=near[count:, :count],
+        D=near[count:, count:],
         rates=np.array([rates_here[name] for name in states]),
         sides=in_words,
         edges={name: "above" if sides[name] > 0.0 else "below" for name in kinks},
@@ -692,15 +669,15 @@ def open_loop(model: LinearModel) -> tuple[Floats, NDArray[np.complex128]] | Non
     None for a controller without PID, a command that is clipped or has no effect, or a controlled quantity at rest.
     """
     scenario, gains, period = model.scenario, model.scenario.controller.settings, model.scenario.controller.period
-    command, outputs = abs(model.inputs[0].value), [signal.name for signal in model.outputs]
+    command = abs(model.values["command"])
     difference = {"pressure_1": 1.0, "pressure_2": -1.0}
     weights = difference if scenario.controlled == "pressure_difference" else {scenario.controlled: 1.0}
-    if scenario.controller.kind not in PID_LAWS or command >= 1.0 or not weights.keys() <= set(outputs):
+    if scenario.controller.kind not in PID_LAWS or command >= 1.0 or not weights.keys() <= set(model.outputs):
         return None
     rates = [1.0 / period, *np.abs(model.poles).tolist(), gains["integral_gain"] / (gains["proportional_gain"] or 1.0)]
     slowest = min(rate for rate in rates if rate > _INTEGRATOR) / (2.0 * np.pi)
     frequencies = np.geomspace(_BELOW_POLES * slowest, 0.5 / period, _POINTS)
-    row = np.asarray(sum(weight * model.c[outputs.index(name)] for name, weight in weights.items()))
+    row = np.asarray(sum(weight * model.C[model.outputs.index(name)] for name, weight in weights.items()))
     # The law skips the dead band that it assumes, within a narrow range of openings.
     band = gains.get("dead_band", 0.0)
     opened = 1.0 - band + (band / SHARPNESS if command < band + (1.0 - band) * SHARPNESS else 0.0)
@@ -729,14 +706,14 @@ def _sampled_plant(model: LinearModel, row: Floats, z: NDArray[np.complex128]) -
     from scipy.linalg import expm
 
     count, period, sensors = len(model.states), model.scenario.controller.period, model.scenario.sensors
-    sizes = np.array([size_of(signal.name) for signal in model.states])
+    sizes = np.array([size_of(name) for name in model.states])
     # The readings of sensors with a bandwidth are states as well; then come the command now, and the one before.
     matrix = np.zeros((2 * count + 1, 2 * count + 1))
-    matrix[:count, :count] = model.a * sizes / sizes[:, None]
-    matrix[:count, -1] = model.b[:, 0] / sizes
+    matrix[:count, :count] = model.A * sizes / sizes[:, None]
+    matrix[:count, -1] = model.B[:, 0] / sizes
     shown = np.zeros(2 * count)
-    for index, signal in enumerate(model.states):
-        bandwidth = getattr(sensors, f"{signal.name.partition('_')[0]}_bandwidth", 0.0)
+    for index, name in enumerate(model.states):
+        bandwidth = getattr(sensors, f"{name.partition('_')[0]}_bandwidth", 0.0)
         matrix[count + index, [index, count + index]] = np.array([1.0, -1.0]) * (2.0 * np.pi * bandwidth or 1.0)
         shown[index + (count if bandwidth else 0)] = row[index] * sizes[index]
     whole, rest = divmod((model.delays.command + model.delays.signals) / period + _ROUNDING, 1.0)

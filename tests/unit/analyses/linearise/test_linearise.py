@@ -115,27 +115,26 @@ def test_the_jacobians_are_those_of_central_differences(name: str) -> None:
     scenario, time, overrides = POINTS[name]
     model = linear(scenario, time, overrides)
     run = plan_run(model.scenario)
-    at = {item.name: item.value for item in (*model.outputs, *model.states, *model.inputs)}
-    at = {"external_torque": 0.0, "angular_velocity": 0.0, **at}
+    at = {"external_torque": 0.0, "angular_velocity": 0.0, **model.values}
     if "angle" not in at:
         at["angle"] = run.initial.angle
-    way = 1.0 if any(item.name == "angular_velocity" for item in model.states) else None
-    rows = [*(f"rate of {item.name}" for item in model.states), *(item.name for item in model.outputs)]
-    found = np.block([[model.a, model.b], [model.c, model.d]])
+    way = 1.0 if "angular_velocity" in model.states else None
+    rows = [*(f"rate of {name}" for name in model.states), *model.outputs]
+    found = np.block([[model.A, model.B], [model.C, model.D]])
     point = of_the_textbook(run, way, at)
     assert model.rates == pytest.approx([point[row] for row in rows[: len(model.states)]], rel=1e-9, abs=1e-4)
     changed = (*model.states, *model.inputs)
-    sizes = [_size(item.name, at) for item in changed]
+    sizes = [_size(item, at) for item in changed]
     # Entries that are nothing beside the others of their row cannot be told from none.
     allowed = 1.0e-8 * np.max(np.abs(found) * sizes, axis=1)
     for column, (item, size) in enumerate(zip(changed, sizes, strict=True)):
 
-        def moved(value: float, name: str = item.name) -> Floats:
+        def moved(value: float, name: str = item) -> Floats:
             beside = of_the_textbook(run, way, {**at, name: value})
             return np.array([beside[row] for row in rows])
 
-        expected = central_difference(moved, at[item.name], 2.0e-4 * size)
-        assert (np.abs(found[:, column] - expected) <= allowed / size).all(), item.name
+        expected = central_difference(moved, at[item], 2.0e-4 * size)
+        assert (np.abs(found[:, column] - expected) <= allowed / size).all(), item
 
 
 def _size(name: str, at: Mapping[str, float]) -> float:
@@ -145,7 +144,7 @@ def _size(name: str, at: Mapping[str, float]) -> float:
 
 
 def test_a_steady_state_is_one_on_the_lanes(steady: LinearModel) -> None:
-    still = {item.name: item.value for item in (*steady.states, *steady.inputs)}
+    still = steady.values
     scenario = ppafo.load_scenario(TASK, ["controller.kind=constant", f"controller.command={still['command']!r}"])
     run = replace(
         scenario,
@@ -158,9 +157,10 @@ def test_a_steady_state_is_one_on_the_lanes(steady: LinearModel) -> None:
 
 
 def test_the_error_of_a_step_falls_with_the_square_of_its_amplitude_over_three_decades(steady: LinearModel) -> None:
-    steps = steps_of(steady, (3e-4, 3e-3, 3e-2, 3e-1))
-    assert steps.sizes[-1] / steps.sizes[0] > 900.0
-    slopes = np.diff(np.log10(steps.errors)) / np.diff(np.log10(steps.amplitudes))
+    amplitudes, runs, model = steps_of(steady, (3e-4, 3e-3, 3e-2, 3e-1))
+    errors, sizes = (np.max(np.abs(changes), axis=1) for changes in (runs - model, runs))
+    assert sizes[-1] / sizes[0] > 900.0
+    slopes = np.diff(np.log10(errors)) / np.diff(np.log10(amplitudes))
     assert slopes[:2] == pytest.approx(2.0, abs=0.003)
     assert slopes[2] == pytest.approx(2.0, abs=0.03)
 
@@ -169,10 +169,10 @@ def test_a_valve_at_its_slew_limit_does_not_answer_and_one_that_has_arrived_does
     slow = ("valve.slew_limit=0.05 1/s", *HOLD)
     moving, steady = linear(TASK, 0.3, slow), linear(TASK, overrides=slow)
     assert "slew limit" in moving.sides["valve"]
-    assert [item.name for item in moving.states][-1] == "valve_opening"
+    assert moving.states[-1] == "valve_opening"
     assert moving.rates[-1] == 0.05
-    assert [item.name for item in steady.states] == ["pressure_1", "pressure_2"]
-    assert steady.b == pytest.approx(linear(TASK, overrides=HOLD).b, rel=1e-9, abs=1e-3)
+    assert steady.states == ("pressure_1", "pressure_2")
+    np.testing.assert_allclose(steady.B, linear(TASK, overrides=HOLD).B, rtol=1e-9, atol=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -184,10 +184,10 @@ def test_at_a_closed_valve_the_model_is_that_of_an_opening_to_chamber_1(
     model = linear(TASK, time, overrides)
     run = plan_run(model.scenario)
     assert model.edges == {"command": "above"}
-    at = {item.name: item.value for item in (*model.outputs, *model.states, *model.inputs)} | {"external_torque": 0.0}
+    at = {**model.values, "external_torque": 0.0}
     closed, opened = (of_the_textbook(run, None, {**at, "command": command}) for command in (0.0, 1e-3))
     slopes = [1e3 * (opened[row] - closed[row]) for row in ("rate of pressure_1", "rate of pressure_2")]
-    assert model.b[:, 0] == pytest.approx(slopes, rel=1e-9, abs=1e-6)
+    assert model.B[:, 0] == pytest.approx(slopes, rel=1e-9, abs=1e-6)
 
 
 def test_a_time_is_taken_to_the_nearest_step_before_the_first_one_too() -> None:
@@ -198,9 +198,9 @@ def test_a_time_is_taken_to_the_nearest_step_before_the_first_one_too() -> None:
 def test_without_a_leak_a_closed_valve_is_steady_and_its_sides_are_told_apart() -> None:
     model = linear(TASK, overrides=(*HOLD, "actuator.leak.area=0 mm^2"))
     assert model.sides["valve"] == "closed"
-    assert model.inputs[0].value == 0.0
-    assert model.outputs[0].value == pytest.approx(3.0, rel=1e-9)
-    assert not model.a.any()
+    assert model.values["command"] == 0.0
+    assert model.values["torque"] == pytest.approx(3.0, rel=1e-9)
+    assert not model.A.any()
     assert list(model.edges) == ["command"]
     with pytest.raises(ScenarioError, match="has a pole at 0 Hz"):
         model.response(np.array([0.0]))
@@ -267,7 +267,7 @@ def test_gains_above_the_gain_margin_oscillate_in_the_simulation_and_gains_below
     assert margins is not None
     assert margins.gain_margin is not None
     assert margins.is_stable
-    point = {state.name: state.value for state in model.states}
+    point = model.values
     swings = []
     for share in (0.96, 1.04):
         overridden = overrides(share * margins.gain_margin)
@@ -284,8 +284,7 @@ def test_a_loop_whose_gain_is_low_is_stable_and_has_the_bandwidth_of_its_integra
     model = linear(TASK, overrides=["reference.level=5 N m"])
     assert model.margins is not None
     assert model.margins.is_stable
-    torque = [signal.name for signal in model.outputs].index("torque")
-    at_rest = float((model.c @ np.linalg.solve(-model.a, model.b))[torque, 0])
+    at_rest = float((model.C @ np.linalg.solve(-model.A, model.B))[model.outputs.index("torque"), 0])
     expected = model.scenario.controller.settings["integral_gain"] * at_rest / math.tau
     assert expected < 2e-4
     assert model.margins.gain_crossover == pytest.approx(expected, rel=0.01)
@@ -329,7 +328,8 @@ def test_margins_and_crossover_are_those_of_loop_shaping() -> None:
 def test_a_pressure_loop_has_an_equilibrium_at_its_reference() -> None:
     for controlled in ("pressure_1", "pressure_2"):
         model = linear("pressure-loop", overrides=[f"reference.of={controlled}"])
-        point = {state.name: state.value for state in model.states}
-        assert point[controlled] == pytest.approx(3e5 + model.scenario.device.supply.atmospheric_pressure, rel=1e-9)
+        assert model.values[controlled] == pytest.approx(
+            3e5 + model.scenario.device.supply.atmospheric_pressure, rel=1e-9
+        )
         assert model.margins is not None
         assert model.margins.is_stable

@@ -33,15 +33,14 @@ def test_the_rates_of_a_linear_model_are_the_slopes_of_the_recording(case: str) 
     model, recording = linear_model(scenario, AT), simulate(scenario).recording
     sample = int(np.argmin(np.abs(recording.time - AT)))
     for place, variable in enumerate(model.states):
-        if variable.name not in recording.names:
+        if variable not in recording.names:
             continue
-        series = recording[variable.name]
+        series = recording[variable]
         slope = (series[sample + 1] - series[sample - 1]) / (recording.time[sample + 1] - recording.time[sample - 1])
         size = max(abs(slope), 1e-2 * float(np.ptp(series)) / AT)
-        assert model.rates[place] == pytest.approx(slope, abs=5.0e-3 * size), variable.name
-        assert variable.value == pytest.approx(series[sample], rel=1e-6), variable.name
-    torque = next(variable for variable in model.outputs if variable.name == "torque")
-    assert torque.value == pytest.approx(recording["torque"][sample], rel=1e-6)
+        assert model.rates[place] == pytest.approx(slope, abs=5.0e-3 * size), variable
+        assert model.values[variable] == pytest.approx(series[sample], rel=1e-6), variable
+    assert model.values["torque"] == pytest.approx(recording["torque"][sample], rel=1e-6)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -49,7 +48,7 @@ def test_the_columns_of_a_linear_model_are_differences_of_its_rates(case: str) -
     name, overrides = CASES[case]
     scenario = load_scenario(ACTUATORS / f"{name}.toml", [*overrides, "run.duration=0.1 s"])
     model, run = linear_model(scenario, AT), plan_run(scenario)
-    values = {variable.name: variable.value for variable in (*model.states, *model.inputs)}
+    values = {name: model.values[name] for name in (*model.states, *model.inputs)}
     way = float(np.sign(values["angular_velocity"])) if "angular_velocity" in values else 0.0
     known = {"external_torque": 0.0, "angular_velocity": 0.0, "angle": run.initial.angle, **values}
     known = {**dict.fromkeys(valve_states(run.program), 0.0), **known}
@@ -59,11 +58,11 @@ def test_the_columns_of_a_linear_model_are_differences_of_its_rates(case: str) -
     known = {"dorsiflexion_pressure": room, **gas, **known}
     plant = plant_of(run, way, known)
     for column, variable in enumerate(model.states):
-        step = 1.0e-6 * max(abs(variable.value), 1.0)
-        more, less = (plant.at({**known, variable.name: variable.value + sign * step})[0] for sign in (1, -1))
-        difference = np.array([(more[item.name] - less[item.name]) / (2.0 * step) for item in model.states])
+        step = 1.0e-6 * max(abs(values[variable]), 1.0)
+        more, less = (plant.at({**known, variable: values[variable] + sign * step})[0] for sign in (1, -1))
+        difference = np.array([(more[name] - less[name]) / (2.0 * step) for name in model.states])
         scale = np.max(np.abs(difference)) + 1e-9
-        assert model.a[:, column] == pytest.approx(difference, abs=1e-4 * scale), variable.name
+        assert model.A[:, column] == pytest.approx(difference, abs=1e-4 * scale), variable
 
 
 def test_a_load_has_the_slopes_of_its_formula_on_every_actuator() -> None:
@@ -76,9 +75,8 @@ def test_a_load_has_the_slopes_of_its_formula_on_every_actuator() -> None:
         point = point_at(plain, AT)
         without, model = (model_at(scenario, plan_run(scenario), point) for scenario in (plain, loaded))
         inertia, rate = plan_run(plain).plant.inertia, point.values["angular_velocity"]
-        states = [variable.name for variable in model.states]
-        row, by_angle = states.index("angular_velocity"), states.index("angle")
-        more = (model.a - without.a)[row]
+        row, by_angle = model.states.index("angular_velocity"), model.states.index("angle")
+        more = (model.A - without.A)[row]
         assert more[by_angle] == pytest.approx(-8.0 / inertia, rel=1e-4), case
         assert more[row] == pytest.approx(-2.0 * 0.05 * abs(rate) / inertia, rel=1e-4), case
 
@@ -86,7 +84,7 @@ def test_a_load_has_the_slopes_of_its_formula_on_every_actuator() -> None:
 def test_the_linear_model_of_one_chamber_has_one_pressure() -> None:
     scenario = load_scenario(ACTUATORS / "torque-task-measured-bladder.toml")
     model = linear_model(scenario, "equilibrium")
-    assert [state.name for state in model.states] == ["pressure_1"]
-    assert "dorsiflexion_pressure" not in [signal.name for signal in model.inputs]
+    assert model.states == ("pressure_1",)
+    assert "dorsiflexion_pressure" not in model.inputs
     assert not [name for name in model.sides if "chamber 2" in name or "leak" in name]
     assert model.sides["ankle"] == "locked"
