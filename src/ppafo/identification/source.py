@@ -60,6 +60,10 @@ class RecordingSource:
         return f"{number:.6g} {unit}".removesuffix(" -")
 
 
+Sources = tuple[RecordingSource, ...]
+"""Recordings of one procedure."""
+
+
 def source_of(path: Path, recording: Recording, trial: str = "") -> RecordingSource:
     """Return a recording with name and hash of its file. Raises DataError if the file no longer exists.
 

@@ -27,7 +27,6 @@ from ppafo.identification.bench.law import (
     BenchContext,
     BenchLaw,
     BenchResult,
-    PooledReadings,
     Values,
     recordings_of,
     reported,
@@ -47,7 +46,7 @@ from ppafo.identification.bench.readings import (
 )
 from ppafo.identification.fit import Fit
 from ppafo.identification.least_squares import FitNumber, Flags
-from ppafo.identification.source import RecordingSource, pool
+from ppafo.identification.source import RecordingSource, Sources, pool
 from ppafo.identification.tolerances import GAS_LAW as LIMIT_OF_GAS_LAW
 from ppafo.identification.tolerances import Tolerances
 from ppafo.model.declaration import Number
@@ -104,6 +103,8 @@ LAW_NAMES: Mapping[Law, str] = {
 }
 """Legend by flow law."""
 
+GAP = "effects.laminar_leak.coefficient"
+"""Path of the coefficient of a laminar gap beside the orifice in a set."""
 TEMPERATURE, GAS_LAW, METER, SENSORS = "gas temperature", "gas law", "gain of the flow meter", "gain of the pressures"
 ZERO = "zero of the flow meter"
 _APPARENT = "laminar gap equivalent to a gain error of the flow meter"
@@ -144,7 +145,7 @@ class FlowLaw(BenchLaw):
         Number("K", "of the gas on the bench, '17 degC'; default: the set's", None, _COLDEST, _HOTTEST), None
     )
 
-    def gas_of(self, sources: tuple[RecordingSource, ...], context: BenchContext) -> GasAt:
+    def gas_of(self, sources: Sources, context: BenchContext) -> GasAt:
         """Return the gas of the bench; species and temperature default to the values of the set.
 
         Raises IdentificationError for an unknown species, and for a flow recorded as one of another gas.
@@ -156,23 +157,21 @@ class FlowLaw(BenchLaw):
             limit = context.tolerances.gas_temperature
             deviation = deviation_of_limit(_THERMOMETER if limit is None else limit)
         if self.gas is None:
-            kind = context.numbers("gas.molar_mass", "gas.heat_capacity_ratio")
+            molar_mass, heat_capacity_ratio = context.numbers("gas.molar_mass", "gas.heat_capacity_ratio")
         elif (species := SPECIES.get(self.gas)) is None:
             raise IdentificationError(f"{context.label}: gas = {self.gas!r} is unknown{known_names(self.gas, SPECIES)}")
         else:
-            kind = [species.molar_mass, species.heat_capacity_ratio]
-        gas = GasAt(kind[0], kind[1], temperature, deviation)
-        for source in sources:
-            channel = source.recording.channels.get("mass_flow")
-            stated = "" if channel is None else channel.stated
+            molar_mass, heat_capacity_ratio = species.molar_mass, species.heat_capacity_ratio
+        for source in (source for source in sources if "mass_flow" in source.recording):
+            stated = source.recording.channels["mass_flow"].stated
             metered = molar_mass_in(stated)
-            used = self.gas or f"the set's, {gas.molar_mass:.4g} kg/mol"
-            if metered is not None and not is_same_gas(metered, gas.molar_mass):
+            if metered is not None and not is_same_gas(metered, molar_mass):
+                used = self.gas or f"the set's, {molar_mass:.4g} kg/mol"
                 raise IdentificationError(
                     f"{source.name}: mass_flow in '{stated}' is a flow of {species_of(metered) or 'another gas'}, "
                     f"{metered:.4g} kg/mol, but the gas of {context.label} is {used}"
                 )
-        return gas
+        return GasAt(molar_mass, heat_capacity_ratio, temperature, deviation)
 
     def gas_used(self, gas: GasAt) -> str:
         """Return the gas of the bench in words."""
@@ -194,7 +193,7 @@ def is_same_gas(molar_mass: float, other: float) -> bool:
 def gas_tolerances(gas: GasAt, tolerances: Tolerances) -> tuple[FitNumber, ...]:
     """Return the uncertain quantities of the gas: temperature [K] and relative departure from the ideal gas law [-]."""
     departure = LIMIT_OF_GAS_LAW if tolerances.gas_law is None else tolerances.gas_law
-    return (*tolerance(TEMPERATURE, gas.temperature_deviation), *within(GAS_LAW, departure))
+    return (*tolerance(TEMPERATURE, gas.temperature_deviation), *within(departure, GAS_LAW))
 
 
 def flow_tolerances(
@@ -203,10 +202,10 @@ def flow_tolerances(
     """Return the uncertain quantities of a flow bench: gas, gains and zeros of the sensors of pressures and flow."""
     return (
         *gas_tolerances(gas, tolerances),
-        *within(METER, tolerances.gain_of("mass_flow")),
-        *within(SENSORS, tolerances.gain_of("pressure")),
-        *within(ZERO, tolerances.zero_of_flow * float(np.abs(flow).max())),
-        *(item for name in pressures for item in within(f"zero of {name}", tolerances.zero_of_pressure)),
+        *within(tolerances.gain_of("mass_flow"), METER),
+        *within(tolerances.gain_of("pressure"), SENSORS),
+        *within(tolerances.zero_of_flow * float(np.abs(flow).max()), ZERO),
+        *within(tolerances.zero_of_pressure, *(f"zero of {name}" for name in pressures)),
     )
 
 
@@ -321,7 +320,7 @@ class Opening:
 
 
 def opening_of(
-    noun: str,
+    noun: Literal["open valve", "leak"],
     section: str,
     gas: GasAt,
     law: Law,
@@ -332,17 +331,17 @@ def opening_of(
 
     ``section`` is that of the opening in a set; a size that a set has not is of the ``noun``.
     """
-    own = {"open valve": "open_valve_flow", "leak": "vane_leak"}[noun]
-    gap = f"{own}.laminar_coefficient" if noun == "open valve" else "effects.laminar_leak.coefficient"
+    own, laminar, beside = ("vane_leak", GAP, "the orifice")
+    if noun == "open valve":
+        own, laminar, beside = ("open_valve_flow", "open_valve_flow.laminar_coefficient", "it")
+    gap = reported(laminar, "kg/(s Pa^2)", f"Laminar coefficient of a gap beside {beside}")
     size, known = of_set or (reported(f"{own}.effective_area", "m^2", f"Effective area Cd A of the {noun}"), 1.0)
     if law == "laminar":
         size = reported(f"{own}.laminar_coefficient", "kg/(s Pa^2)", f"Laminar coefficient of the {noun}")
     elif law == "iso6358" or critical_ratio is not None:
         of_ratio = "" if critical_ratio is None else f" with the set's b = {critical_ratio:g}"
         size = reported(f"{section}.sonic_conductance", "m^3/(s Pa)", f"Sonic conductance C of the {noun}{of_ratio}")
-    beside = "it" if noun == "open valve" else "the orifice"
-    gap_number = reported(gap, "kg/(s Pa^2)", f"Laminar coefficient of a gap beside {beside}")
-    return Opening(gas, law, size, known, critical_ratio, gap_number)
+    return Opening(gas, law, size, known, critical_ratio, gap)
 
 
 def has_both_regimes(opening: Opening, ratio: Floats, source: RecordingSource) -> bool:
@@ -360,7 +359,7 @@ def has_both_regimes(opening: Opening, ratio: Floats, source: RecordingSource) -
 
 
 def steady_readings(
-    sources: tuple[RecordingSource, ...], names: tuple[str, str], zero: float, used: Flags
+    sources: Sources, names: tuple[str, str], zero: float, used: Flags
 ) -> tuple[dict[str, Floats], Floats, list[str], tuple[str, ...]]:
     """Return pressures [Pa] by name, flow [kg/s] and recording of the possible readings, and remarks on the others.
 
@@ -384,18 +383,19 @@ def flow_through(at: Values, opening: Opening, pressures: Mapping[str, Floats]) 
 def solve_flow(
     opening: Opening,
     pressures: Mapping[str, Floats],
-    readings: PooledReadings,
+    flow: Floats,
+    labels: Sequence[tuple[str, ...]],
     tolerances: Tolerances,
     confidence: float,
     ratios: Sequence[float] = CRITICAL_RATIOS[:1],
 ) -> tuple[Fit, Floats]:
-    """Fit an opening to measured flow. Returns the fit and the fitted flow [kg/s].
+    """Fit an opening to a measured ``flow`` with ``labels``. Returns the fit and the fitted flow [kg/s].
 
     ``pressures`` are two channels [Pa absolute]; a positive flow [kg/s] runs from the first to the second. A sought
     critical ratio starts from the best of ``ratios`` [-], the sizes, in which the flow is linear, from non-negative
     least squares.
     """
-    flow, (first, second) = readings.measured, pressures.values()
+    first, second = pressures.values()
     units = {ratio: [factor * shape for _, factor, shape in opening.parts(first, second, ratio)] for ratio in ratios}
     ratio = max(units, key=lambda each: abs(float(units[each][0] @ flow)) / float(np.linalg.norm(units[each][0])))
     columns = np.stack(units[ratio], axis=1)
@@ -405,9 +405,9 @@ def solve_flow(
         *opening.unknowns(starts, alone.tolist(), ratio),
         *flow_tolerances(opening.gas, tolerances, pressures, flow),
         # A gain that differs between small and large flows bends the curve of one opening as a gap beside it does.
-        *(within(_APPARENT, tolerances.gain_of("mass_flow") * float(alone[1])) if opening.law == "both" else ()),
+        *(within(tolerances.gain_of("mass_flow") * float(alone[1]), _APPARENT) if opening.law == "both" else ()),
     )
-    return solve(lambda at: flow_through(at, opening, pressures), readings, numbers, confidence)
+    return solve(lambda at: flow_through(at, opening, pressures), flow, labels, numbers, confidence)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -420,7 +420,7 @@ class OpenValveFlowProblem(FlowLaw):
     valve: str | None = keyed(VALVE, None)
     law: Law = keyed("flow law, also the form in which the set gives it", "orifice")
 
-    def run(self, sources: tuple[RecordingSource, ...], context: BenchContext) -> BenchResult:
+    def run(self, sources: Sources, context: BenchContext) -> BenchResult:
         """Identify Cd [-] or Cd A [m^2], C [m^3/(s Pa)] and b [-], or c [kg/(s Pa^2)] of the open valve.
 
         The laws are equations (6) and (7), ISO 6358, and a laminar gap; ``both`` adds a gap to an orifice, or to ISO
@@ -459,7 +459,7 @@ class OpenValveFlowProblem(FlowLaw):
             )
         if np.ptp(flow[is_open]) <= 0.0:
             check_moves(sources[0], "mass_flow")
-        pressures, flow, labels, meter_remarks = steady_readings(sources, _VALVE_PRESSURES, zero, is_open)
+        pressures, flow, recorded, meter_remarks = steady_readings(sources, _VALVE_PRESSURES, zero, is_open)
         (upstream, downstream), flow = pressures.values(), np.abs(flow)
         ratio = downstream / upstream
         # In parallel with a laminar gap, b selects ISO 6358; the law ``iso6358`` estimates b.
@@ -471,8 +471,8 @@ class OpenValveFlowProblem(FlowLaw):
         # The nearer the pressures are to each other, the more their noise affects the computed flow.
         limits = critical_pressure_ratio(gas.heat_capacity_ratio), _NEARLY_EQUAL
         regimes = [_REGIMES[regime] for regime in np.digitize(ratio, limits).tolist()]
-        readings = PooledReadings(flow, regimes, labels)
-        fitted, model = solve_flow(opening, pressures, readings, context.tolerances, self.confidence)
+        labels = list(zip(recorded, regimes, strict=True))
+        fitted, model = solve_flow(opening, pressures, flow, labels, context.tolerances, self.confidence)
         scatter = float(np.std(flow - model) / flow.max())
         # Densely, so that the curve has no kinks at the readings; between them the upstream pressure is interpolated.
         dense, order = np.linspace(ratio.min(), ratio.max(), 200), np.argsort(ratio)

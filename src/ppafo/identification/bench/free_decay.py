@@ -39,7 +39,7 @@ from ppafo.identification.bench.readings import (
     without_wrong_samples,
 )
 from ppafo.identification.least_squares import FitNumber
-from ppafo.identification.source import RecordingSource, window
+from ppafo.identification.source import RecordingSource, Sources, window
 from ppafo.model.declaration import Number
 from ppafo.parameters.records import keyed
 from ppafo.report.kind import TIME, Kind
@@ -241,7 +241,7 @@ class FreeDecayProblem(TimedLaw):
         inertia = context.number(path)
         return inertia, 0.0 if inertia is None else context.deviation(path, inertia, "kg m^2")
 
-    def run(self, sources: tuple[RecordingSource, ...], context: BenchContext) -> BenchResult:
+    def run(self, sources: Sources, context: BenchContext) -> BenchResult:
         """Identify viscous damping [N m s/rad] and dynamic friction [N m], or both over inertia [1/s, rad/s^2].
 
         The model is equation (1), fitted to angle and, if recorded, angular velocity. Several recordings are several
@@ -278,19 +278,38 @@ class FreeDecayProblem(TimedLaw):
             )
         # Without an inertia the fitted parameters are parameters divided by the inertia.
         assumed_inertia = inertia or 1.0
-        variables = (
-            *_unknowns(decays, of_damping, of_friction, assumed_inertia, rise),
-            *tolerance(_INERTIA, inertia_deviation / assumed_inertia),
-            *within(_GAIN, context.tolerances.gain_of(_ANGLE)),
-        )
-        # A wrong law gives different parameters for fast and for slow motion.
-        parts = []
-        for decay in decays:
+        initial, rates, parts = list[FitNumber](), [], []
+        for number, decay in enumerate(decays, start=1):
+            velocity, _ = smoothed_rates(decay.time, decay.angle)
+            speed = max(float(np.abs(velocity[:_FEWEST_SMOOTHED]).max()), _LEAST_SPEED)
+            swept = max(abs(float(decay.angle[-1] - decay.angle[0])), _LEAST_SWEPT)
+            initial.append(sought(_START_ANGLE.format(number), float(decay.angle[0]), scale=swept))
+            # The sign of the decay has the direction, so that the speed is positive.
+            initial.append(sought(_START_SPEED.format(number), speed, 1e-9 * speed, 10.0 * speed))
+            # Half of the rate w_0 / s of damping alone, and of the deceleration w_0^2 / (2 s) of friction alone.
+            rates.append((0.5 * speed / swept, 0.25 * speed**2 / swept))
+            # A wrong law gives different parameters for fast and for slow motion.
             moved = np.abs(decay.angle - decay.angle[0])
             half = int(np.searchsorted(np.maximum.accumulate(moved), 0.5 * float(moved.max())))
             speeds = [] if decay.velocity is None else [(_VELOCITY, decay.velocity)]
             parts.append((half, [(_ANGLE, decay.angle), *speeds]))
-        readings = halved_readings(sources, parts, ("the first half of the travel", "the second half of the travel"))
+        starts = [assumed_inertia * float(median) for median in np.median(rates, axis=0)]
+        # The prior of ln(1 + q) is uniform up to ``rise``: its standard deviation is its width over sqrt(12).
+        most, usual = math.log1p(rise), _USUAL_RISE_VELOCITY
+        near_rest = (
+            FitNumber(_RISE, 0.5 * most, 0.0, 2.0 * most, most, most / math.sqrt(12.0)),
+            FitNumber(_RISE_VELOCITY, usual, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY, usual, usual),
+        )
+        variables = (
+            *(sought(number, start, 0.0) for number, start in zip((of_damping, of_friction), starts, strict=True)),
+            *initial,
+            *(near_rest if most > 0.0 else ()),
+            *tolerance(_INERTIA, inertia_deviation / assumed_inertia),
+            *within(context.tolerances.gain_of(_ANGLE), _GAIN),
+        )
+        measured, labels = halved_readings(
+            sources, parts, ("the first half of the travel", "the second half of the travel")
+        )
 
         def slowing_of(at: Values, inertia: float) -> Slowing:
             damping_rate, deceleration = (max(at[number.path], 0.0) / inertia for number in (of_damping, of_friction))
@@ -305,7 +324,7 @@ class FreeDecayProblem(TimedLaw):
                     series.append(decay.sign * speed)
             return np.concatenate(series)
 
-        fit, model = solve(law, readings, variables, self.confidence)
+        fit, model = solve(law, measured, labels, variables, self.confidence)
         slowing = slowing_of(fit.by_name, assumed_inertia)
         at_rest = sum(
             float(decay.time[-1]) > fall_to_standstill(fit.by_name[_START_SPEED.format(number)], slowing)[0][-1]
@@ -322,38 +341,6 @@ class FreeDecayProblem(TimedLaw):
             _panels(decays, model, slowing),
             remarks=remarks,
         )
-
-
-def _unknowns(
-    decays: Sequence[FreeDecay], of_damping: FitNumber, of_friction: FitNumber, inertia: float, rise: float
-) -> tuple[FitNumber, ...]:
-    """Return damping, friction, initial angle and speed of each decay, and the rise of the friction near standstill.
-
-    With w_0 the initial speed and s the swept angle, viscous damping alone has the rate w_0 / s, and Coulomb friction
-    alone the deceleration w_0^2 / (2 s); the search starts from half of each.
-    """
-    initial, rates = list[FitNumber](), []
-    for number, decay in enumerate(decays, start=1):
-        velocity, _ = smoothed_rates(decay.time, decay.angle)
-        speed = max(float(np.abs(velocity[:_FEWEST_SMOOTHED]).max()), _LEAST_SPEED)
-        swept = max(abs(float(decay.angle[-1] - decay.angle[0])), _LEAST_SWEPT)
-        initial.append(sought(_START_ANGLE.format(number), float(decay.angle[0]), scale=swept))
-        # The sign of the decay has the direction, so that the speed is positive.
-        initial.append(sought(_START_SPEED.format(number), speed, 1e-9 * speed, 10.0 * speed))
-        rates.append((0.5 * speed / swept, 0.25 * speed**2 / swept))
-    damping_rate, deceleration = (float(median) for median in np.median(rates, axis=0))
-    # The prior of ln(1 + q) is uniform up to ``rise``: its standard deviation is its width over sqrt(12).
-    most, usual = math.log1p(rise), _USUAL_RISE_VELOCITY
-    near_rest = (
-        FitNumber(_RISE, 0.5 * most, 0.0, 2.0 * most, most, most / math.sqrt(12.0)),
-        FitNumber(_RISE_VELOCITY, usual, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY, usual, usual),
-    )
-    return (
-        sought(of_damping, inertia * damping_rate, 0.0),
-        sought(of_friction, inertia * deceleration, 0.0),
-        *initial,
-        *(near_rest if most > 0.0 else ()),
-    )
 
 
 def _panels(decays: Sequence[FreeDecay], model: Floats, slowing: Slowing) -> tuple[Panel, Panel]:

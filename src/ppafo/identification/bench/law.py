@@ -15,7 +15,7 @@ from ppafo.identification.fit import Fit, conflict_in_words, estimate_of, fit, w
 from ppafo.identification.least_squares import FitNumber, ResidualBlock
 from ppafo.identification.new_set import stated_half_width
 from ppafo.identification.noise import SAMPLES_PER_COEFFICIENT
-from ppafo.identification.source import RecordingSource, kind_of, remarks_on_readings
+from ppafo.identification.source import Sources, kind_of, remarks_on_readings
 from ppafo.identification.tolerances import DEFAULTS, Columns, Confidence, Tolerances
 from ppafo.model.declaration import Number
 from ppafo.parameters.parameter_set import ParameterSet, chosen_valve, number_in_si, with_followers
@@ -109,7 +109,7 @@ class BenchLaw(ABC):
     confidence: Confidence = 0.95
 
     @abstractmethod
-    def run(self, sources: tuple[RecordingSource, ...], context: BenchContext) -> BenchResult:
+    def run(self, sources: Sources, context: BenchContext) -> BenchResult:
         """Identify what the law has from recordings.
 
         Raises IdentificationError, with file and sample, for recordings that do not determine it.
@@ -125,7 +125,7 @@ class TimedLaw(BenchLaw):
 
 
 def result_of(
-    sources: tuple[RecordingSource, ...],
+    sources: Sources,
     fitted: Fit,
     summary: str,
     panels: tuple[Panel, ...],
@@ -184,9 +184,9 @@ def tolerance(name: str, deviation: float, start: float = 0.0, family: str = "")
     return (FitNumber(name, start, start - width, start + width, limit, deviation, (), True, family=family),)
 
 
-def within(name: str, limit: float, family: str = "") -> tuple[FitNumber, ...]:
-    """Return an error of the bench within +-``limit`` [SI], as a variable with a prior; nothing if exact."""
-    return tolerance(name, deviation_of_limit(limit), family=family)
+def within(limit: float, *names: str, family: str = "") -> tuple[FitNumber, ...]:
+    """Return errors of the bench within +-``limit`` [SI], as variables with a prior; nothing if exact."""
+    return tuple(number for name in names for number in tolerance(name, deviation_of_limit(limit), family=family))
 
 
 def sought(
@@ -202,64 +202,49 @@ def reported(path: str, unit: str, text: str, size: float | None = None) -> FitN
     return FitNumber(path, unit=unit, text=text, size=size)
 
 
-@dataclass(frozen=True, slots=True)
-class PooledReadings:
-    """Readings of all recordings, with labels for each reading.
-
-    ``measured`` are the values [unit of the channel], ``sensors`` name the sensor (one noise each), ``recordings`` the
-    recording or repetition, and ``groups`` other groups. The separate estimates of each sensor, recording and group are
-    tested against the common estimates.
-    """
-
-    measured: Floats
-    sensors: Sequence[str]
-    recordings: Sequence[str]
-    groups: tuple[Sequence[str], ...] = ()
-
-
-def recordings_of(sources: tuple[RecordingSource, ...], counts: Iterable[int] = ()) -> list[str]:
-    """Return for each reading the label of its recording, with the file name; ``counts`` are readings by recording."""
-    sizes = tuple(counts) or [len(source.recording) for source in sources]
-    pairs = enumerate(zip(sources, sizes, strict=True), start=1)
-    return [label for number, (source, size) in pairs for label in [f"recording {number} ({source.name})"] * size]
+def recordings_of(sources: Sources) -> list[str]:
+    """Return for each reading of all recordings the label of its recording, with the file name."""
+    named = [(f"recording {number} ({source.name})", source) for number, source in enumerate(sources, start=1)]
+    return [label for label, source in named for _ in source.recording.time]
 
 
 def halved_readings(
-    sources: tuple[RecordingSource, ...],
-    parts: Iterable[tuple[int, Iterable[tuple[str, Floats]]]],
-    names: tuple[str, str],
-) -> PooledReadings:
-    """Return the samples over time of all sources, with the two halves of each as groups of these ``names``.
+    sources: Sources, parts: Iterable[tuple[int, Iterable[tuple[str, Floats]]]], names: tuple[str, str]
+) -> tuple[Floats, list[tuple[str, ...]]]:
+    """Return the samples over time of all sources with their labels, of which the last is the ``names`` of its half.
 
     ``parts`` are, for each source, the first sample of the second half, and the channels with their samples.
     """
-    series, sensors, halves, counts = list[Floats](), list[str](), list[str](), list[int]()
-    for half, channels in parts:
-        before = len(sensors)
+    series, labels = list[Floats](), list[tuple[str, ...]]()
+    for number, (source, (half, channels)) in enumerate(zip(sources, parts, strict=True), start=1):
         for sensor, values in channels:
             series.append(values)
-            sensors += [sensor] * values.size
-            halves += [names[0]] * half + [names[1]] * (values.size - half)
-        counts.append(len(sensors) - before)
-    return PooledReadings(np.concatenate(series), sensors, recordings_of(sources, counts), (halves,))
+            whole = f"recording {number} ({source.name})", sensor
+            labels += [(*whole, names[0])] * half + [(*whole, names[1])] * (values.size - half)
+    return np.concatenate(series), labels
 
 
 def solve(
-    law: Callable[[Values], Floats], readings: PooledReadings, numbers: Sequence[FitNumber], confidence: float
+    law: Callable[[Values], Floats],
+    measured: Floats,
+    labels: Sequence[tuple[str, ...]],
+    numbers: Sequence[FitNumber],
+    confidence: float,
 ) -> tuple[Fit, Floats]:
     """Fit a law to readings. Returns the fit, and the fitted values in the unit of the readings.
 
-    Residuals of sensors whose readings are too few for correlated noise are tested for runs in order of the law.
+    ``labels`` of each reading are its recording or repetition, its sensor (one noise each), and further groups. The
+    separate estimates of each of them are tested against the common ones. Residuals of sensors whose readings are too
+    few for correlated noise are tested for runs in order of the law.
     """
-    names, measured = [number.name for number in numbers], readings.measured
-    keys = list(zip(readings.recordings, readings.sensors, *readings.groups, strict=True))
+    names = [number.name for number in numbers]
     # In the order of their first reading, so that the first block is the first recording.
-    ranks = {key: rank for rank, key in enumerate(dict.fromkeys(keys))}
+    ranks = {label: rank for rank, label in enumerate(dict.fromkeys(labels))}
     # A block of the fit is a slice, so that readings of one label must lie side by side.
-    ranked = np.array([ranks[key] for key in keys])
+    ranked = np.array([ranks[label] for label in labels])
     order, counts = np.argsort(ranked, kind="stable"), np.bincount(ranked)
-    ends, sensors = np.cumsum([0, *counts]), np.array(readings.sensors)
-    of_sensor = {name: measured[sensors == name] for name in dict.fromkeys(readings.sensors)}
+    ends, sensors = np.cumsum([0, *counts]), np.array([sensor for _, sensor, *_ in labels])
+    of_sensor = {name: measured[sensors == name] for name in dict.fromkeys(sensors.tolist())}
     # A meter shows six digits at most: residuals below say nothing.
     least, blocks = 1.0e-6 * float(np.ptp(measured)), []
     for (recording, sensor, *groups), rank in ranks.items():

@@ -9,7 +9,7 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.least_squares import Flags
-from ppafo.identification.source import RecordingSource, pool, window
+from ppafo.identification.source import RecordingSource, Sources, pool, window
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.faults import longest_gap, noise_of, outlying_samples, plateaus, resolution_of
 from ppafo.signals.recording import Floats
@@ -42,8 +42,8 @@ _LARGEST_NUMBER = 1.0e12
 
 
 def without_wrong_samples(
-    sources: tuple[RecordingSource, ...], names: Sequence[str], start: float | None, end: float | None
-) -> tuple[tuple[RecordingSource, ...], tuple[str, ...]]:
+    sources: Sources, names: Sequence[str], start: float | None, end: float | None
+) -> tuple[Sources, tuple[str, ...]]:
     """Return recordings over time without outliers in the channels ``names``, and remarks on the samples left out.
 
     An outlier is far off its neighbours, by the rule of the fit of motion, between ``start`` and ``end`` [s]; a step of
@@ -111,9 +111,7 @@ def check_not_alone(source: RecordingSource, name: str) -> None:
             _refuse_outlier(source, name, [int(wrong)], float(values[wrong]), float(values[others[-1]]))
 
 
-def check_no_wrong_reading(
-    sources: tuple[RecordingSource, ...], name: str, drivers: Sequence[Floats], used: Flags
-) -> None:
+def check_no_wrong_reading(sources: Sources, name: str, drivers: Sequence[Floats], used: Flags) -> None:
     """Raise IdentificationError for a reading far off the six readings with the most similar driving quantities.
 
     An example is a typing error. ``drivers`` are the driving quantities of the readings of all recordings, ``used``
@@ -150,7 +148,7 @@ def check_no_wrong_reading(
 
 
 def meter_readings(
-    sources: tuple[RecordingSource, ...], direction: Floats, zero: float, used: Flags | None = None
+    sources: Sources, direction: Floats, zero: float, used: Flags
 ) -> tuple[Floats, Flags, tuple[str, ...]]:
     """Return flow meter readings with sign [kg/s], flags of possible readings, and remarks on the others.
 
@@ -160,35 +158,35 @@ def meter_readings(
     shows negative flows only beyond that error.
 
     Arguments: ``direction`` (readings,) of all recordings, positive for a positive flow; ``used`` marks the readings
-    that count, default all. Raises IdentificationError if more than a tenth are impossible.
+    that count. Raises IdentificationError if more than a tenth are impossible.
     """
     flow = pool(sources, "mass_flow")
-    counted = np.ones(flow.size, dtype=np.bool_) if used is None else used
-    largest = float(np.abs(flow[counted]).max(initial=0.0))
+    largest = float(np.abs(flow[used]).max(initial=0.0))
     # A shut valve gives readings of both signs by the zero of the meter.
-    lowest = float(flow[counted].min(initial=0.0))
+    lowest = float(flow[used].min(initial=0.0))
     has_sign = lowest < -zero * largest
-    against = counted & (direction * flow < 0.0) & (np.abs(flow) > (zero * largest if lowest < 0.0 else 0.0))
-    many = _MOST_IMPOSSIBLE * np.count_nonzero(counted)
+    against = used & (direction * flow < 0.0) & (np.abs(flow) > (zero * largest if lowest < 0.0 else 0.0))
+    count = np.count_nonzero(used)
+    many = _MOST_IMPOSSIBLE * count
     if not has_sign and np.count_nonzero(against) > many:
-        return np.where(direction < 0.0, -flow, flow), counted, ()
+        return np.where(direction < 0.0, -flow, flow), used, ()
     wrong = np.flatnonzero(against)
     if wrong.size > many:
         sources[0].refuse(
-            f"the flow is opposite to the direction of pressures and command "
-            f"in {wrong.size} of {np.count_nonzero(counted)} readings: a wrong sign of 'mass_flow'"
+            f"the flow is opposite to the direction of pressures and command in {wrong.size} of {count} readings: a "
+            "wrong sign of 'mass_flow'"
         )
     if not wrong.size:
-        return flow, counted, ()
+        return flow, used, ()
     source, before = _recording_with(sources, int(wrong[0]))
     remark = (
-        f"left out: {wrong.size} of {np.count_nonzero(counted)} readings with flow against the pressures and the "
+        f"left out: {wrong.size} of {count} readings with flow against the pressures and the "
         f"command; the first is sample {int(wrong[0]) - before + 1} of {source.name}"
     )
-    return flow, counted & ~against, (remark,)
+    return flow, used & ~against, (remark,)
 
 
-def _recording_with(sources: tuple[RecordingSource, ...], sample: int) -> tuple[RecordingSource, int]:
+def _recording_with(sources: Sources, sample: int) -> tuple[RecordingSource, int]:
     """Return the recording that contains a pooled sample, and the number of samples before that recording."""
     ends = np.cumsum([len(source.recording) for source in sources])
     index = int(np.searchsorted(ends, sample, side="right"))
@@ -210,7 +208,7 @@ def _refuse_outlier(source: RecordingSource, name: str, samples: list[int], valu
 
 
 def check_sources(
-    sources: tuple[RecordingSource, ...],
+    sources: Sources,
     channels: Sequence[str],
     fewest: int,
     moving: Iterable[str] = (),

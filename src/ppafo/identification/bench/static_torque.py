@@ -22,7 +22,6 @@ from ppafo.identification.bench.law import (
     BenchContext,
     BenchLaw,
     BenchResult,
-    PooledReadings,
     Values,
     recordings_of,
     reported,
@@ -41,7 +40,7 @@ from ppafo.identification.bench.readings import (
 )
 from ppafo.identification.estimate import in_shown_unit
 from ppafo.identification.least_squares import Flags
-from ppafo.identification.source import RecordingSource, pool
+from ppafo.identification.source import RecordingSource, Sources, pool
 from ppafo.report.kind import Kind
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.recording import Floats
@@ -81,7 +80,7 @@ class StaticTorqueProblem(BenchLaw):
     own_errors = ("zero",)
     kind: Literal["static-torque"]
 
-    def run(self, sources: tuple[RecordingSource, ...], context: BenchContext) -> BenchResult:
+    def run(self, sources: Sources, context: BenchContext) -> BenchResult:
         """Identify torque constant [m^3], friction without pressure [N m], its growth [m^3], and scale zero [N m].
 
         For a force the units are m^2 and N. Raises IdentificationError for recordings that cannot separate them.
@@ -146,10 +145,10 @@ class StaticTorqueProblem(BenchLaw):
             sought(of_friction, friction, scale=scale),
             sought(of_growth, 0.0, scale=scale / float(np.abs(pressure).max())),
             sought(of_zero, zero, scale=scale),
-            *(number for name in zeros for number in within(name, tolerances.zero_of_pressure)),
-            *within(_GAIN, tolerances.gain_of("pressure")),
-            *within(load_gain, tolerances.gain_of(channel)),
-            *(number for name in frictions for number in within(name, tolerances.friction, "friction")),
+            *within(tolerances.zero_of_pressure, *zeros),
+            *within(tolerances.gain_of("pressure"), _GAIN),
+            *within(tolerances.gain_of(channel), load_gain),
+            *within(tolerances.friction, *frictions, family="friction"),
         )
 
         def of_files(at: Values, names: list[str]) -> Floats:
@@ -163,17 +162,14 @@ class StaticTorqueProblem(BenchLaw):
             # Loads over their noise.
             return np.asarray(weight * ((1.0 + at[load_gain]) * (at[slope_path] * true - resisting) + at[_ZERO]))
 
+        is_high = pressure > 0.5 * (pressure.max() + pressure.min())
         groups = (
+            [labels[sample] for sample in first.tolist()],
+            [channel] * pressure.size,
             np.where(branch > 0.0, "the rising branch", "the falling branch").tolist(),
-            np.where(
-                pressure > 0.5 * (pressure.max() + pressure.min()),
-                "readings at higher pressures",
-                "readings at lower pressures",
-            ).tolist(),
+            np.where(is_high, "readings at higher pressures", "readings at lower pressures").tolist(),
         )
-        recorded = [labels[sample] for sample in first.tolist()]
-        readings = PooledReadings(weight * load, [channel] * pressure.size, recorded, groups)
-        fitted, model = solve(law, readings, numbers, self.confidence)
+        fitted, model = solve(law, weight * load, list(zip(*groups, strict=True)), numbers, self.confidence)
         values, residuals = fitted.by_name, load - model / weight
         drawn = []
         for role, sign, motion in (("rising", 1.0, "with"), ("falling", -1.0, "against")):
@@ -200,7 +196,7 @@ class StaticTorqueProblem(BenchLaw):
         return result
 
 
-def _used_readings(sources: tuple[RecordingSource, ...], channel: str, zero_of_pressure: float) -> Flags:
+def _used_readings(sources: Sources, channel: str, zero_of_pressure: float) -> Flags:
     """Return flags of the readings that count, of all recordings.
 
     ``zero_of_pressure`` [Pa] is the zero error limit of the pressure sensor. Raises IdentificationError for recordings
@@ -254,7 +250,7 @@ def _used_readings(sources: tuple[RecordingSource, ...], channel: str, zero_of_p
     return is_used
 
 
-def _slides(sources: tuple[RecordingSource, ...]) -> bool:
+def _slides(sources: Sources) -> bool:
     """Return whether a position or an angle moves with the direction at constant pressure."""
 
     def change(source: RecordingSource, name: str, span: float) -> float:

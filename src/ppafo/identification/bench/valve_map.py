@@ -17,11 +17,10 @@ from typing import Literal
 
 import numpy as np
 
-from ppafo.identification.bench.flow import VALVE, ZERO, FlowLaw, GasAt, flow_tolerances, orifice_shape, shown_flow
+from ppafo.identification.bench.flow import VALVE, ZERO, FlowLaw, flow_tolerances, orifice_shape, shown_flow
 from ppafo.identification.bench.law import (
     BenchContext,
     BenchResult,
-    PooledReadings,
     Values,
     recordings_of,
     reported,
@@ -33,7 +32,7 @@ from ppafo.identification.bench.readings import check_no_wrong_reading, check_so
 from ppafo.identification.estimate import Verdict
 from ppafo.identification.fit import SHAPE, Conflict
 from ppafo.identification.least_squares import FitNumber
-from ppafo.identification.source import RecordingSource, pool
+from ppafo.identification.source import RecordingSource, Sources, pool
 from ppafo.model.effects.kind import SECTION
 from ppafo.model.effects.opening import NODES
 from ppafo.model.valves.proportional import spool_position
@@ -41,6 +40,7 @@ from ppafo.parameters.records import keyed
 from ppafo.report.kind import Kind
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.recording import Floats
+from ppafo.simulation.recorded.channels import check_command
 
 _PRESSURES = ("upstream_pressure", "downstream_pressure")
 _MINIMUM_SAMPLES = 12
@@ -75,7 +75,7 @@ class ValveMapProblem(FlowLaw):
     valve: str | None = keyed(VALVE, None)
     nodes: tuple[float, ...] = keyed("commands of a table of openings; default: straight beyond a dead band", ())
 
-    def run(self, sources: tuple[RecordingSource, ...], context: BenchContext) -> BenchResult:
+    def run(self, sources: Sources, context: BenchContext) -> BenchResult:
         """Identify dead band [-], gain [m^2], saturation [-] and hysteresis [-] from command and flow; (6), (7).
 
         With nodes the opening is a table over the command in place of dead band, gain and saturation. Raises
@@ -85,11 +85,12 @@ class ValveMapProblem(FlowLaw):
         check_sources(sources, self.needed, _MINIMUM_SAMPLES, ("command", "mass_flow"), absolute=_PRESSURES)
         command, upstream, downstream = (pool(sources, name) for name in ("command", *_PRESSURES))
         direction, zero = np.sign(command * (upstream - downstream)), context.tolerances.zero_of_flow
-        measured, is_possible, remarks = meter_readings(sources, direction, zero)
+        is_read = np.ones(command.size, dtype=bool)
+        measured, is_possible, remarks = meter_readings(sources, direction, zero, is_read)
         branch, size = np.concatenate([_branch_of(source) for source in sources]), np.abs(command)
         if (span := float(np.ptp(command))) < _MINIMUM_RANGE:
             sources[0].refuse(f"the command covers a range of {span:.3g}, not {_MINIMUM_RANGE:g} or more")
-        check_no_wrong_reading(sources, "mass_flow", (command, branch), np.ones(branch.size, dtype=bool))
+        check_no_wrong_reading(sources, "mass_flow", (command, branch), is_read)
         shape = np.abs(orifice_shape(upstream, downstream, gas.heat_capacity_ratio))
         if not shape.any():
             sources[0].refuse("both pressures are equal in all readings, so nothing drives a flow")
@@ -127,17 +128,19 @@ class ValveMapProblem(FlowLaw):
             return np.asarray(np.where(is_possible, shown_flow(at, gas, pressures, through), measured))
 
         groups = (
+            recordings_of(sources),
+            ["mass_flow"] * measured.size,
             np.where(branch < 0.0, "falling commands", "rising commands").tolist(),
             np.where(command > 0.0, "commands to chamber 1", "commands to chamber 2").tolist(),
             np.where(size > 0.5 * highest, "large commands", "small commands").tolist(),
         )
-        readings = PooledReadings(measured, ["mass_flow"] * measured.size, recordings_of(sources), groups)
-        fitted, model = solve(law, readings, numbers, self.confidence)
+        labels = list(zip(*groups, strict=True))
+        fitted, model = solve(law, measured, labels, numbers, self.confidence)
         reason = ""
         # Corners are refuted where an opening with rounded ones, tried in its place, explains the readings better.
         if not self.nodes and (fitted.conflict is None or fitted.conflict.number == SHAPE):
             free = [number for number in numbers if math.isinf(number.deviation) or number.name == ZERO]
-            rounded, _ = solve(law, readings, (*free, sought(_ROUND, *_ROUNDS)), self.confidence)
+            rounded, _ = solve(law, measured, labels, (*free, sought(_ROUND, *_ROUNDS)), self.confidence)
             gain = rounded.log_likelihood - fitted.log_likelihood
             if gain > _BETTER:
                 reason = (
@@ -166,7 +169,7 @@ class ValveMapProblem(FlowLaw):
             remarks,
         )
         if self.nodes:
-            return self._as_table(result, path, band, openings, context, gas)
+            return self._as_table(result, band, openings)
         # Near the highest command there is no saturation to be seen.
         seen = [item for item in result.estimates if item.path != _SATURATION or item.value < highest - _SATURATES]
         return replace(result, estimates=tuple(seen))
@@ -213,13 +216,8 @@ class ValveMapProblem(FlowLaw):
             sought(saturation, 0.02 * half + 0.98 * highest, half, highest * (1.0 + 1e-9), highest),
         )
 
-    def _as_table(
-        self, result: BenchResult, path: str, band: str, openings: Sequence[str], context: BenchContext, gas: GasAt
-    ) -> BenchResult:
-        """Return the result with openings that do not fall, and beside them commands and no dead band, for a set.
-
-        A remark tells the number of the set that the full opening contradicts or confirms.
-        """
+    def _as_table(self, result: BenchResult, band: str, openings: Sequence[str]) -> BenchResult:
+        """Return the result with openings that do not fall, and beside them commands and no dead band, for a set."""
         highest, (full, *others) = 0.0, result.estimates
         nodes = [estimate for estimate in others if estimate.path in openings]
         usable = [node.verdict for node in nodes if node.is_usable]
@@ -233,34 +231,17 @@ class ValveMapProblem(FlowLaw):
             beside = {f"{SECTION}.opening.command_{number:02}": command, band: 0.0}
             low, high = min(node.low, highest), max(node.high, highest)
             table.append(replace(node, value=highest, low=low, high=high, beside=beside, verdict=verdict))
-        result = replace(result, estimates=(full, *table, *others[len(nodes) :]))
-        names = ("discharge_coefficient", "sonic_conductance", "area")
-        coefficient, conductance, area = (context.number(f"{path}.{name}") for name in names)
-        if not full.is_usable or not (coefficient or conductance):
-            return result
-        if coefficient:
-            # The set has area and coefficient, of which the map knows the product alone.
-            read = f"with the Cd of the set {path}.area = {1e6 * full.value / coefficient:.4g} mm^2"
-            has = f"{1e6 * (area or 0.0):.4g} mm^2"
-        else:
-            measured = 1e8 * full.value * gas.choked_flow_constant / gas.flow_per_sonic_conductance
-            read, has = f"{path}.sonic_conductance = {measured:.4g} L/(s bar)", f"{1e8 * (conductance or 0.0):.4g}"
         remark = (
-            f"the opening is a share of the full one: {read}, and the set has {has}, which stays; no interval counts "
-            "that the opening is straight between two nodes"
+            f"the openings are shares of {_FULL}, and the size of the valve in the set stays; no interval counts that "
+            "the opening is straight between two nodes"
         )
-        return replace(result, remarks=(*result.remarks, remark))
+        return replace(result, estimates=(full, *table, *others[len(nodes) :]), remarks=(*result.remarks, remark))
 
 
 def _branch_of(source: RecordingSource) -> Floats:
-    """Return the direction of the command, 1 rising and -1 falling; unless recorded, it is that of the last change.
-
-    Raises IdentificationError for a command beyond -1 or 1.
-    """
+    """Return the direction of the command, 1 rising and -1 falling; unless recorded, it is that of the last change."""
+    check_command(source.recording, source.where)
     requested = source.recording["command"]
-    wrong = np.flatnonzero(np.abs(requested) > 1.0 + 1e-9)
-    if wrong.size:
-        source.refuse(f"channel 'command' is {requested[wrong[0]]:g} at sample {wrong[0] + 1}; must be from -1 to 1")
     # Before the first change it is 0.
     signs = np.sign(np.diff(requested, prepend=requested[0]))
     last = np.maximum.accumulate(np.where(signs != 0.0, np.arange(signs.size), 0))

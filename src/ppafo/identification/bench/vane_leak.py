@@ -23,6 +23,7 @@ import numpy as np
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import (
     CRITICAL_RATIOS,
+    GAP,
     GAS_LAW,
     LAW_NAMES,
     TEMPERATURE,
@@ -39,7 +40,6 @@ from ppafo.identification.bench.flow import (
 from ppafo.identification.bench.law import (
     BenchContext,
     BenchResult,
-    PooledReadings,
     TimedLaw,
     Values,
     halved_readings,
@@ -61,7 +61,7 @@ from ppafo.identification.bench.readings import (
 from ppafo.identification.estimate import in_shown_unit, interval_texts
 from ppafo.identification.fit import Fit
 from ppafo.identification.least_squares import FitNumber
-from ppafo.identification.source import RecordingSource, window
+from ppafo.identification.source import RecordingSource, Sources, window
 from ppafo.model.declaration import Number
 from ppafo.parameters.device import VANE
 from ppafo.parameters.records import keyed
@@ -99,8 +99,6 @@ _AT_BOUND = 1.0e-3
 """Distance of a critical ratio from its bounds [-] up to which it is at its bound."""
 _SYMBOLS = {"sonic_conductance": "C", "critical_ratio": "b", "coefficient": "c"}
 """Symbols of the quantities that a sentence states, by last part of the path."""
-_GAP = "effects.laminar_leak.coefficient"
-"""Path of the coefficient of a laminar gap beside the orifice in a set."""
 _TRIAL_RATIOS = tuple(np.linspace(*CRITICAL_RATIOS[1:], 20).tolist())
 """Critical ratios [-], the best of which starts the search for steady flow.
 
@@ -127,7 +125,7 @@ class LeakLaw(FlowLaw):
         "flow law; an orifice in the form of the set; 'iso6358': C and b; 'both': orifice and laminar gap", "orifice"
     )
 
-    def run(self, sources: tuple[RecordingSource, ...], context: BenchContext) -> BenchResult:
+    def run(self, sources: Sources, context: BenchContext) -> BenchResult:
         """Identify the leak: A_leak [m^2], C [m^3/(s Pa)] or a laminar coefficient [kg/(s Pa^2)]; equations (6), (7).
 
         The laws ``iso6358`` and ``both`` are compared with each other: the values of one hold for this model only if
@@ -150,19 +148,17 @@ class LeakLaw(FlowLaw):
             known_ratio = None if each == "iso6358" else critical_ratio
             openings.append(opening_of("leak", "actuator.leak", gas, form, known_ratio, of_set))
         result = self.leak(sources, context, openings)
-        gap = next((each for each in result.estimates if each.path == _GAP and each.is_usable and each.value), None)
+        gap = next((each for each in result.estimates if each.path == GAP and each.is_usable and each.value), None)
         if gap is None or own is None or is_same_gas(own, gas.molar_mass):
             return result
         # The flow of a laminar gap goes with 1 / (R T viscosity), that of an orifice needs no viscosity.
-        remark = f"{_GAP} is not written to the set, whose gas is not that of the bench and has another viscosity"
+        remark = f"{GAP} is not written to the set, whose gas is not that of the bench and has another viscosity"
         of_bench = replace(gap, path="vane_leak.laminar_coefficient")
         estimates = tuple(of_bench if item is gap else item for item in result.estimates)
         return replace(result, estimates=estimates, remarks=(*result.remarks, remark))
 
     @abstractmethod
-    def leak(
-        self, sources: tuple[RecordingSource, ...], context: BenchContext, openings: Sequence[Opening]
-    ) -> BenchResult:
+    def leak(self, sources: Sources, context: BenchContext, openings: Sequence[Opening]) -> BenchResult:
         """Identify the leak by the first of the openings, compared with the last one."""
 
 
@@ -174,25 +170,23 @@ class SteadyLeakProblem(LeakLaw):
     steady = ("vane-leak-steady",)
     kind: Literal["vane-leak-steady"]
 
-    def leak(
-        self, sources: tuple[RecordingSource, ...], context: BenchContext, openings: Sequence[Opening]
-    ) -> BenchResult:
+    def leak(self, sources: Sources, context: BenchContext, openings: Sequence[Opening]) -> BenchResult:
         """Identify the leak from steady flow; several pressures separate the zero of the flow meter."""
         check_sources(sources, self.needed, _FEWEST_STEADY, moving=("mass_flow",), absolute=_CHAMBERS)
         for source in sources:
             check_not_clipped(source, "mass_flow", "pressure_1", source.recording["pressure_1"])
         is_used = np.ones(sum(len(source.recording) for source in sources), dtype=bool)
         zero = context.tolerances.zero_of_flow
-        pressures, flow, labels, remarks = steady_readings(sources, _CHAMBERS, zero, is_used)
+        pressures, flow, recorded, remarks = steady_readings(sources, _CHAMBERS, zero, is_used)
         first, second = pressures.values()
         # A wrong law gives different sizes at low and at high pressures.
         difference, ratio = first - second, np.minimum(first, second) / np.maximum(first, second)
         is_high = difference > np.median(difference)
         halves = np.where(is_high, "flow at higher pressures", "flow at lower pressures").tolist()
-        readings = PooledReadings(flow, ["mass_flow"] * flow.size, labels, (halves,))
+        labels = list(zip(recorded, ["mass_flow"] * flow.size, halves, strict=True))
         has_both = has_both_regimes(openings[0], ratio, sources[0])
         fits = [
-            solve_flow(opening, pressures, readings, context.tolerances, self.confidence, _TRIAL_RATIOS)
+            solve_flow(opening, pressures, flow, labels, context.tolerances, self.confidence, _TRIAL_RATIOS)
             for opening in openings
         ]
         model = fits[0][1]
@@ -212,7 +206,7 @@ class SteadyLeakProblem(LeakLaw):
 
 
 def _compared(
-    sources: tuple[RecordingSource, ...],
+    sources: Sources,
     openings: Sequence[Opening],
     fits: Sequence[tuple[Fit, Floats]],
     has_both: bool,
@@ -283,8 +277,9 @@ class ChamberDecay(NamedTuple):
 
     ``time`` is in s; ``sensors`` are channel and pressures [Pa] of the fuller chamber and of the other; ``number`` is
     the number of the decay. ``changes`` are the fall of the pressure in the fuller chamber and its rise in the other
-    [Pa], ``room`` is the index of a constant pressure in ``sensors``, None if both change. ``half`` is the first sample
-    with less than half of the pressure difference, ``fall`` the fall of the difference relative to its start [-].
+    [Pa]; ``room`` is the index of a constant pressure in ``sensors``, None if both change, ``changing`` that of the
+    pressure that determines the leak, and ``fitted`` are the sensors without that of the room. ``half`` is the first
+    sample with less than half of the pressure difference, ``fall`` its fall relative to the start [-].
     """
 
     time: Floats
@@ -292,18 +287,10 @@ class ChamberDecay(NamedTuple):
     number: int
     changes: tuple[float, float]
     room: int | None
+    changing: int
+    fitted: list[tuple[str, Floats]]
     half: int
     fall: float
-
-    @property
-    def changing(self) -> int:
-        """Index of the changing pressure that determines the leak: 0 for the fuller chamber, 1 for the other."""
-        return 1 if self.room == 0 else 0
-
-    @property
-    def fitted(self) -> list[tuple[str, Floats]]:
-        """Fitted channels with their pressures [Pa]; the constant pressure of a room is not fitted."""
-        return [sensor for side, sensor in enumerate(self.sensors) if side != self.room]
 
 
 def _edge_of(time: Floats) -> int:
@@ -347,8 +334,11 @@ def chamber_decay(source: RecordingSource, start: float | None, end: float | Non
         # By straight lines through the samples at the edges: a mean over them would underestimate the fall.
         initial = float(np.polyfit(time[:edge], difference[:edge], 1)[1])
         final = float(np.polyfit(time[-edge:] - time[-1], difference[-edge:], 1)[1])
-    half, sensors = int(np.argmax(difference < 0.5 * (initial + final))), ((fuller, first), (emptier, second))
-    return ChamberDecay(time, sensors, number, (-fall, rise), room, half, 1.0 - final / initial)
+    sensors = (fuller, first), (emptier, second)
+    # The constant pressure of a room is not fitted.
+    fitted = [sensor for side, sensor in enumerate(sensors) if side != room]
+    half, lost = int(np.argmax(difference < 0.5 * (initial + final))), 1.0 - final / initial
+    return ChamberDecay(time, sensors, number, (-fall, rise), room, 1 if room == 0 else 0, fitted, half, lost)
 
 
 def pressures_of_fall(
@@ -428,9 +418,7 @@ class VaneLeakProblem(LeakLaw, TimedLaw):
             deviation = math.hypot(of_volume, of_angle) / (dead_1 + per_angle * (angle - lower))
         return first, second, deviation
 
-    def leak(
-        self, sources: tuple[RecordingSource, ...], context: BenchContext, openings: Sequence[Opening]
-    ) -> BenchResult:
+    def leak(self, sources: Sources, context: BenchContext, openings: Sequence[Opening]) -> BenchResult:
         """Identify the leak from the pressures in closed chambers."""
         if all("mass_flow" in source.recording for source in sources):
             sources[0].refuse("has a 'mass_flow': the flow that maintains a pressure is of procedure vane-leak-steady")
@@ -462,15 +450,11 @@ class VaneLeakProblem(LeakLaw, TimedLaw):
             *_unknowns(decays, volume, other_volume, volume_deviation),
             *gas_tolerances(openings[0].gas, context.tolerances),
             *tolerance(_VOLUME, volume_deviation if volume else 0.0),
-            *(
-                zero
-                for sensor, _ in decays[0].sensors
-                for zero in within(f"zero of {sensor}", context.tolerances.zero_of_pressure)
-            ),
+            *within(context.tolerances.zero_of_pressure, *(f"zero of {sensor}" for sensor, _ in decays[0].sensors)),
         )
         # A wrong law gives different sizes early and late in a fall.
         parts = [(decay.half, decay.fitted) for decay in decays]
-        readings = halved_readings(sources, parts, ("the early fall", "the late fall"))
+        measured, labels = halved_readings(sources, parts, ("the early fall", "the late fall"))
         longest = max(float(decay.time[-1]) for decay in decays)
 
         def law(at: Values, opening: Opening) -> Floats:
@@ -497,14 +481,27 @@ class VaneLeakProblem(LeakLaw, TimedLaw):
 
         fits = []
         for opening in openings:
-            unknowns = _start_sizes(decays, opening, volume or 1.0)
-            fits.append(solve(partial(law, opening=opening), readings, (*unknowns, *others), self.confidence))
+            # As if each part of the leak alone caused the mean rate of the pressure change.
+            rate = opening.gas.specific_gas_constant * opening.gas.temperature / (volume or 1.0)
+            sizes = []
+            for decay in decays:
+                (_, first), (_, second) = decay.sensors
+                flows = [
+                    float(np.mean(per * flow)) for _, per, flow in opening.parts(first, second, CRITICAL_RATIOS[0])
+                ]
+                scatter = float(np.std(np.diff(decay.sensors[decay.changing][1])))
+                change = max(decay.changes[decay.changing], _SCATTER_OF_CHANGE * scatter, _LEAST_CHANGE)
+                sizes.append([change / (rate * flow * float(decay.time[-1])) for flow in flows])
+            alone = [float(np.mean(of_part)) for of_part in zip(*sizes, strict=True)]
+            # The search starts from equal contributions of orifice and gap.
+            unknowns = opening.unknowns([size / len(alone) for size in alone], alone, CRITICAL_RATIOS[0])
+            fits.append(solve(partial(law, opening=opening), measured, labels, (*unknowns, *others), self.confidence))
         model = fits[0][1]
         times = [decay.time for decay in decays for _ in decay.fitted]
         time, models = np.concatenate(times), np.split(model, np.cumsum([values.size for values in times])[:-1])
         # The legend names the first curve only.
         names = [LAW_NAMES[openings[0].law], *[""] * (len(times) - 1)]
-        marks = [readings_mark("measured", time, readings.measured)]
+        marks = [readings_mark("measured", time, measured)]
         marks += [curve_mark(*curve) for curve in zip(names, times, models, strict=True)]
         if all(decay.room is not None for decay in decays):
             remarks = (*remarks, f"the pressure in chamber {3 - chamber} is constant, so it is treated as a reservoir")
@@ -516,7 +513,7 @@ class VaneLeakProblem(LeakLaw, TimedLaw):
             fits,
             has_both,
             f"{count_of(len(decays), 'decay')} of up to {longest:.3g} s; the pressure difference falls by {fall:.1%}",
-            with_residuals("Closed chambers", *axes, marks, time, readings.measured - model),
+            with_residuals("Closed chambers", *axes, marks, time, measured - model),
             remarks,
         )
 
@@ -527,21 +524,6 @@ def _over_volume(size: FitNumber, chamber: int) -> FitNumber:
     if size.unit == "m^2":
         return reported("vane_leak.area_over_volume", "1/m", text)
     return reported(f"vane_leak.{size.path.split('.')[-1]}_over_volume", f"{size.unit[:-1]} m^3)", text)
-
-
-def _start_sizes(decays: Sequence[ChamberDecay], opening: Opening, volume: float) -> tuple[FitNumber, ...]:
-    """Return the sizes of the leak, as if each part of it alone caused the mean rate of the pressure change."""
-    rate = opening.gas.specific_gas_constant * opening.gas.temperature / volume
-    sizes = []
-    for decay in decays:
-        (_, first), (_, second) = decay.sensors
-        flows = opening.parts(first, second, CRITICAL_RATIOS[0])
-        scatter = float(np.std(np.diff(decay.sensors[decay.changing][1])))
-        change = max(decay.changes[decay.changing], _SCATTER_OF_CHANGE * scatter, _LEAST_CHANGE)
-        sizes.append([change / (rate * float(np.mean(per * flow)) * float(decay.time[-1])) for _, per, flow in flows])
-    alone = [float(np.mean(of_part)) for of_part in zip(*sizes, strict=True)]
-    # The search starts from equal contributions of orifice and gap.
-    return opening.unknowns([size / len(alone) for size in alone], alone, CRITICAL_RATIOS[0])
 
 
 def _unknowns(
@@ -570,6 +552,6 @@ def _unknowns(
                 initial = replace(initial, start=float(values.mean()), deviation=deviation_in_room)
             unknowns.append(initial)
         for sensor, _ in decay.fitted:
-            unknowns += within(_RELAXED_BY.format(sensor, decay.number), _MOST_RELAXED)
+            unknowns += within(_MOST_RELAXED, _RELAXED_BY.format(sensor, decay.number))
     # Only the order of magnitude of tau is known, so the variable is its logarithm.
     return [*unknowns, FitNumber(_RELAXATION, 0.0, low=-5.0, high=math.log(_RELAXED), scale=1.0, deviation=1.5)]

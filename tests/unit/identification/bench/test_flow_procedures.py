@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from ppafo.errors import IdentificationError
+from ppafo.errors import DataError, IdentificationError
 from ppafo.identification.bench.flow import GasAt, Opening, iso6358_shape, orifice_shape
 from ppafo.identification.bench.vane_leak import pressures_of_fall
 from ppafo.identification.noise import burg
@@ -210,7 +210,7 @@ def test_a_valve_that_is_open_at_command_zero_is_told() -> None:
 def test_a_command_in_percent_is_told() -> None:
     source = planted.sweep()
     percent = changed(source, "command", 100.0 * source.recording["command"])
-    with pytest.raises(IdentificationError, match="must be from -1 to 1"):
+    with pytest.raises(DataError, match="must be from -1 to 1"):
         valve_map((percent,), planted.CO2)
 
 
