@@ -17,7 +17,7 @@ from ppafo.documents.json_text import fields_of, json_text, plain
 from ppafo.errors import DataError, ParameterError, SimulationError
 from ppafo.model.catalog import VALVES
 from ppafo.model.gas import temperature_flow_factor
-from ppafo.model.orifice import FlowCurve, orifice_flow
+from ppafo.model.orifice import orifice_flow
 from ppafo.model.sensors import follow, quantise
 from ppafo.model.valves.proportional import spool_position
 from ppafo.parameters.device import VANE, Device, SonicOrifice
@@ -172,23 +172,18 @@ def _steady_leak(device: Device, _preset: Preset, _seed: int) -> dict[str, Float
     ambient, plant = device.supply.atmospheric_pressure, plant_parameters(device)
     levels = ambient + np.tile(np.arange(5.0, 85.0, 5.0) * PASCALS_PER_PSI, 2)
     laminar = device.effects.get("laminar_leak", {}).get("coefficient", 0.0)
-    through = [_flow(level, ambient, plant.leak_conductance, plant.leak_curve) for level in levels.tolist()]
+    flows = [orifice_flow(level, ambient, plant.leak_conductance, 1.0, plant.leak_curve) for level in levels.tolist()]
     return {
         "pressure_1": levels,
         "pressure_2": np.full(levels.size, ambient),
-        "mass_flow": np.array(through) + laminar * (levels**2 - ambient**2),
+        "mass_flow": np.array([flow for flow, _, _ in flows]) + laminar * (levels**2 - ambient**2),
     }
-
-
-def _flow(upstream: float, downstream: float, conductance: float, curve: FlowCurve) -> float:
-    flow, _, _ = orifice_flow(upstream, downstream, conductance, 1.0, curve)
-    return flow
 
 
 def _valve_flow(device: Device, preset: Preset, upstream: float, downstream: float, opening: float) -> float:
     """Mass flow [kg/s] of the valve at two pressures [Pa] and an opening [-], for the gas in the flow meter."""
     plant = plant_parameters(device)
-    flow = _flow(upstream, downstream, opening * plant.valve_conductance, plant.valve_curve)
+    flow, _, _ = orifice_flow(upstream, downstream, opening * plant.valve_conductance, 1.0, plant.valve_curve)
     warmer = device.gas.temperature + preset.values["bench.gas_difference"]
     return flow * temperature_flow_factor(device.gas.temperature, warmer)
 
@@ -328,12 +323,13 @@ def _run(experiment: str, scenario: Scenario) -> dict[str, Floats]:
     if not result.status.is_completed:
         raise SimulationError(f"the simulated test bench: {result.status}")
     found, supply = result.recording, device.supply
-    constant = {"supply_pressure": supply.pressure, "dorsiflexion_pressure": supply.dorsiflexion_pressure}
-    values = {name: np.full(len(found), level) for name, level in constant.items()}
-    # Regulators that give way feed lines.
-    lines = {"supply_pressure": "line_pressure_1", "dorsiflexion_pressure": "line_pressure_2"}
-    values |= {name: found[line] for name, line in lines.items() if line in found}
-    values |= {name: found[name] for name in found.names}
+    values = {name: found[name] for name in found.names}
+    for name, line, level in (
+        ("supply_pressure", "line_pressure_1", supply.pressure),
+        ("dorsiflexion_pressure", "line_pressure_2", supply.dorsiflexion_pressure),
+    ):
+        # Regulators that give way feed lines.
+        values.setdefault(name, found[line] if line in found else np.full(len(found), level))
     return {name: values[name] for name in EXPERIMENTS[experiment].channels}
 
 
