@@ -25,7 +25,7 @@ _HOMES = {
     "ppafo.analyses.identify": ("Identification", "identify"),
     "ppafo.analyses.linearise.question": ("linearise",),
     "ppafo.analyses.reproduce.question": ("reproduce",),
-    "ppafo.analyses.sensitivity.question": ("sensitivity",),
+    "ppafo.analyses.sensitivity": ("sensitivity",),
     "ppafo.analyses.tune": ("tune",),
     "ppafo.errors": (
         "ArgumentError",

@@ -13,7 +13,7 @@ from ppafo.analyses.linearise.model import LinearModel as LinearModel
 from ppafo.analyses.linearise.question import linearise as linearise
 from ppafo.analyses.reproduce.question import reproduce as reproduce
 from ppafo.analyses.reproduce.solve import Reproduction as Reproduction
-from ppafo.analyses.sensitivity.question import sensitivity as sensitivity
+from ppafo.analyses.sensitivity import sensitivity as sensitivity
 from ppafo.analyses.sets.audit import audit as audit
 from ppafo.analyses.study_results import StudyResults as StudyResults
 from ppafo.analyses.study_results import load_study_results as load_study_results

@@ -10,7 +10,8 @@ from ppafo.remedy_trials import verdict_of
 from ppafo.report.finding import Column, Finding, Section, columns_of
 from ppafo.report.kind import ConfidenceInterval, Kind, of_metric, of_path
 from ppafo.report.panels import Mark, Panel, dots
-from ppafo.report.style import BLACK, BLUE, COLOURS, GREEN, GREY, VERMILION, look_of_valve
+from ppafo.report.setting_names import label_of
+from ppafo.report.style import BLACK, BLUE, COLOURS, GREEN, GREY, MARKERS, VERMILION, look_of_valve
 from ppafo.running import simulate
 from ppafo.simulation.declaration import changes_reach
 from ppafo.simulation.ensemble.running import lacking
@@ -22,18 +23,28 @@ from ppafo.simulation.tracking.remarks import standing_still
 from ppafo.simulation.tracking.remedies import change_text
 from ppafo.simulation.tracking.rule import CRITERION_TEXTS, shortfall
 from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import FEWEST_DRAWS, MAXIMUM_DRAWS, REPLICATES, Uncertainty, seeds_of_noise, uncertainty_of
+from ppafo.studies.draws import (
+    FEWEST_DRAWS,
+    MAXIMUM_DRAWS,
+    REPLICATES,
+    Uncertainty,
+    replicate_seed,
+    seeds_of_noise,
+    uncertainty_of,
+)
 from ppafo.studies.intervals import (
     effective_sample_size,
+    jackknife_reach,
     noise_interval,
     replicates_interval,
     share_interval,
 )
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, level_of
-from ppafo.studies.loading import study_of
+from ppafo.studies.loading import drawn_in, study_of
 from ppafo.studies.study import DEFAULT_SEED, Configuration, configurations_with
 from ppafo.studies.varying import VariedPath, distribution_in, value_at, varied_path
 from ppafo.study.blocks import unvaried
-from ppafo.study.runs import FAILED, Rows, RunCounter, scenario_runs
+from ppafo.study.executing import executor_of
+from ppafo.study.runs import FAILED, Rows, RunCounter, Runs, scenario_runs
 from ppafo.units import split_quantity
 from ppafo.wording import override_text

@@ -180,7 +180,7 @@ class StudyResults:
         stored = list(dict.fromkeys([*outputs.get("trajectories", ()), *outputs.get("bands", ())]))
         if channel not in stored:
             raise StudyError(f"the study stores no trajectories of '{channel}'{known_names(channel, stored)}")
-        return self.matrix(channel)
+        return self._matrix(channel)
 
     def bands(self) -> Columns:
         """Return quantile bands over time as columns: configuration, channel, time, and a column for each quantile."""
@@ -200,8 +200,7 @@ class StudyResults:
             numbers = numbers[of_each * self.configurations.index(configuration) :][:of_each]
         return (self.folder.table(chunk_file(number), columns) for number in numbers)
 
-    def matrix(self, channel: str, configuration: str | None = None, samples: slice = slice(None)) -> Floats:
-        """Return samples of a stored channel (runs, samples), of one configuration or of all."""
+    def _matrix(self, channel: str, configuration: str | None = None, samples: slice = slice(None)) -> Floats:
         column = trace_column(channel)
         parts = self.chunks([column], configuration)
         return np.concatenate([matrix_of(part.column(column))[:, samples] for part in parts])
@@ -321,7 +320,7 @@ def _bands_file(study: Study, results: StudyResults) -> bytes:
         samples = samples_of(study, configuration)
         for row, channel in enumerate(outputs.bands):
             for start in range(0, samples, at_once):
-                values = results.matrix(channel, configuration.name, slice(start, start + at_once))
+                values = results._matrix(channel, configuration.name, slice(start, start + at_once))
                 counts = np.count_nonzero(np.isfinite(values), axis=0)
                 levels = sorted_quantiles(np.sort(values, axis=0), counts, outputs.quantiles)
                 places = {"configuration": np.full(counts.size, number), "channel": np.full(counts.size, row)}

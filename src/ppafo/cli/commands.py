@@ -69,7 +69,7 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
             f"{_ANALYSES}.compare:compare", "Compare configurations, also over an uncertain device."
         ),
         "sensitivity": Command(
-            f"{_ANALYSES}.sensitivity.question:sensitivity",
+            f"{_ANALYSES}.sensitivity:sensitivity",
             *_STUDIES,
             first_line="Rank uncertain values by their influence: Sobol or Shapley indices, signed changes.",
         ),

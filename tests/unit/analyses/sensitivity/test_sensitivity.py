@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.analyses.sensitivity.methods import METHODS, Influences, analyse
-from ppafo.analyses.sensitivity.question import sensitivity
+from ppafo.analyses.sensitivity import METHODS, Influences, analyse, sensitivity
 from ppafo.errors import StudyError
 from ppafo.studies.distributions import Distribution, Floats
 from ppafo.studies.draws import Uncertainty

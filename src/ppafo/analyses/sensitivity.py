@@ -1,4 +1,4 @@
-"""Methods of sensitivity analysis, Sobol and Shapley, with signed changes; indices for growing samples, and the report.
+"""Influence of uncertain values on metrics: Sobol indices, Shapley effects and signed changes.
 
 A design consists of blocks: a base point of Sobol with its exchanged copies, or an order of the values for Shapley. A
 block is the smallest unit that can be left out.
@@ -8,33 +8,49 @@ describe only the remaining ones. Otherwise every block (base point or order) wi
 since the formulas need complete blocks; the indices then hold for values at which the model runs.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ppafo.analyses import ask, np
+from ppafo.arguments import (
+    Confidence,
+    Executor,
+    MaximumFailed,
+    Metrics,
+    Name,
+    Overrides,
+    Seed,
+    Threads,
+    Whole,
+    Word,
+    checked,
+)
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
-from ppafo.report.finding import Column, Finding, Section
-from ppafo.report.kind import Kind, of_metric
-from ppafo.report.panels import Mark, Panel
-from ppafo.report.setting_names import label_of
-from ppafo.report.style import COLOURS, GREY, MARKERS
-from ppafo.simulation.numbers import NOISE_SEED
-from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import Uncertainty, replicate_seed
-from ppafo.studies.intervals import jackknife_reach
-from ppafo.study.runs import Runs
-from ppafo.wording import argument_text
+from ppafo.plugins import Plugins, name_plugins
+from ppafo.progress import Report
+from ppafo.units.shown import shown_in
+from ppafo.wording import argument_text, known_names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
+    from ppafo.report.finding import Finding
+    from ppafo.studies.distributions import Floats
+    from ppafo.studies.study import Study
+
+DistributedStudy = Annotated[
+    "Study | str | Path | Mapping[str, Any]", Word("STUDY", help="a study with distributions: a name, or a .toml file")
+]
+MethodName = Annotated[str, Word("sobol|shapley")]
 _ENDS = (0.05, 0.95)
 """Quantiles of a varied value between which the change of a metric is computed."""
 DEFAULT_SAMPLES = {"sobol": 8192, "shapley": 2048}
@@ -64,6 +80,77 @@ _ONE = 0.6827
 """Confidence level of an interval of plus and minus one standard deviation."""
 _NEAREST = 0.2
 """Fraction of the runs, nearest to an end of a value, to which the parabola is fitted."""
+
+
+@checked
+def sensitivity(
+    study: DistributedStudy,
+    *,
+    method: MethodName | None = None,
+    metrics: Metrics = (),
+    samples: Whole | None = None,
+    configuration: Name | None = None,
+    independent: bool = False,
+    overrides: Overrides = (),
+    seed: Seed | None = None,
+    confidence: Confidence = 0.95,
+    maximum_failed: MaximumFailed = 0.02,
+    threads: Threads | None = None,
+    executor: Executor | None = None,
+    plugins: Plugins = (),
+    progress: Report | None = None,
+) -> Finding[Influences]:
+    """Rank uncertain values by their influence: Sobol or Shapley indices, signed changes.
+
+    Sensor noise counts as one of the values. A block of the sample with a failed run is left out and counted.
+
+    Arguments:
+        study: a study with distributions: a name, or a .toml file
+        method: default: sobol, or shapley if values are correlated
+        metrics: metric to analyse, may be repeated; default: the metrics of the study
+        samples: number of base points (sobol, default 8192) or orders (shapley, 2048)
+        configuration: configuration of the study, needed if it has several
+        independent: ignore the correlations of the study
+        overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated
+        seed: random seed; default: the file's
+        confidence: confidence of all intervals; default 95%
+        maximum_failed: fraction of the runs that may fail before the study is refused; default 2%
+        threads: number of threads; default: all cores
+        executor: an Executor of concurrent.futures, such as a cluster's, or the MODULE:OBJECT of one; default: this
+            process
+        plugins: modules of your own, files or names, whose objects files may name
+        progress: called with every count of a long computation
+
+    Returns:
+        a Finding whose ``found`` is the Influences: indices with bands of every metric
+
+    Raises:
+        StudyError: a study that cannot be used, and more than ``maximum_failed`` of its runs fail
+
+    >>> import ppafo
+    >>> study, choice = "torque-task-uncertainty", {"configuration": "solenoid", "metrics": "rms_error"}
+    >>> print(ppafo.sensitivity(study, samples=64, **choice).said[0])
+    torque-task-uncertainty, solenoid: shapley, 64 orders, 1,152 runs of 7 uncertain values; bands with 95 %
+    confidence
+    """
+    name_plugins(plugins)
+    if method is not None and method not in METHODS:
+        raise StudyError(f"there is no method '{method}'{known_names(method, METHODS)}")
+    chosen, base, used = ask.drawn_in(study, overrides, configuration, independent)
+    # Sobol indices of correlated values mean nothing; Shapley effects take more runs for the same bands.
+    by = METHODS[method or ("sobol" if used.scores is None else "shapley")]
+    requested = tuple(metrics) or chosen.outputs.metrics
+    if not requested:
+        raise StudyError(f"the outputs of study '{chosen.name}' have no metric; name the metric to analyse")
+    count = DEFAULT_SAMPLES[by.name] if samples is None else samples
+    tally = ask.RunCounter(count * by.block_rows(len(used.drawn)), progress)
+    runs = ask.scenario_runs(base.scenario, requested, tally, used.gauge, threads, ask.executor_of(executor))
+    with shown_in(chosen.shown_for(base.scenario)):
+        seed = chosen.sample.seed if seed is None else seed
+        found = analyse(runs, used, by, count, requested, seed, confidence, maximum_failed)
+        gains = ask.remark_on_following_gains(base.scenario, used.paths), base.scenario.origin.replaced
+        finding = finding_of(replace(found, study=f"{chosen.name}, {base.name}", gains=gains))
+        return replace(finding, overrides=chosen.changes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,11 +185,11 @@ class Method(NamedTuple):
     name: str
     noun: str
     block_rows: Callable[[int], int]
-    design: Callable[[Uncertainty, int, int], Floats]
+    design: Callable[[ask.Uncertainty, int, int], Floats]
     indices: Callable[[Floats, NDArray[np.intp], int, int, float], tuple[dict[str, Floats], dict[str, Floats]]]
 
 
-def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
+def _sobol_design(uncertainty: ask.Uncertainty, blocks: int, seed: int) -> Floats:
     """Return fractions in (0, 1) for a power of 2 of blocks; block b belongs to scramble b % SCRAMBLES."""
     if blocks & (blocks - 1):
         raise StudyError(f"samples = {blocks}: Sobol indices need a power of 2, for example {1 << blocks.bit_length()}")
@@ -112,7 +199,7 @@ def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
     design = np.empty((points_of_scramble, SCRAMBLES, dimensions + 2, dimensions))
     exchanged = np.arange(dimensions)
     for number in range(SCRAMBLES):
-        scramble_seed = replicate_seed(seed, number) % 2**32
+        scramble_seed = ask.replicate_seed(seed, number) % 2**32
         # Saltelli (2002): a point A, its copies in which value i comes from B, and B. `seed`, not `rng`: the points of
         # earlier studies.
         points = qmc.Sobol(2 * dimensions, scramble=True, seed=scramble_seed).random(points_of_scramble)
@@ -143,7 +230,7 @@ def _sobol_indices(
     # Points of one scramble depend on each other, scrambles do not: those are left out in turn.
     scramble = blocks % SCRAMBLES
     left_out = np.array([total_and_first(table[scramble != number]) for number in np.unique(scramble)])
-    values, reach = total_and_first(table), jackknife_reach(left_out, confidence)
+    values, reach = total_and_first(table), ask.jackknife_reach(left_out, confidence)
     return {"total": values[0], "first": values[1]}, {"total": reach[0], "first": reach[1]}
 
 
@@ -155,7 +242,7 @@ because the points of one sequence are not independent and resampling them gives
 """
 
 
-def _shapley_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
+def _shapley_design(uncertainty: ask.Uncertainty, blocks: int, seed: int) -> Floats:
     """Return fractions in (0, 1) of a design for Shapley effects.
 
     For each block and each prefix of its order of values, there are draws with the remaining values fixed.
@@ -239,7 +326,7 @@ def _change(
         np.subtract(*(_levels(values, inputs, float(end), part, nearest) for end in ends[::-1]))
         for nearest in (_NEAREST, 0.5 * _NEAREST)
     )
-    spread, bend_spread = jackknife_reach(whole[1:], confidence), jackknife_reach((whole - nearer)[1:], _ONE)
+    spread, bend_spread = ask.jackknife_reach(whole[1:], confidence), ask.jackknife_reach((whole - nearer)[1:], _ONE)
     # Of the square of the difference, what is chance on average is no bend.
     bend = math.sqrt(max(float((whole - nearer)[0] ** 2 - bend_spread**2), 0.0))
     return float(whole[0]), float(spread) + 2.0 * bend
@@ -327,8 +414,8 @@ class Influences:
 
 @on_one_thread
 def analyse(
-    runs: Runs,
-    uncertainty: Uncertainty,
+    runs: ask.Runs,
+    uncertainty: ask.Uncertainty,
     method: Method,
     samples: int,
     metrics: Sequence[str],
@@ -380,7 +467,7 @@ def analyse(
         changes = []
         for number in uncertainty.drawn:
             # A seed has no order: from its 5 to its 95 % quantile nothing changes.
-            ends = number.distribution.values(np.array(_ENDS)) * (np.nan if number.path == NOISE_SEED else 1.0)
+            ends = number.distribution.values(np.array(_ENDS)) * (np.nan if number.path == ask.NOISE_SEED else 1.0)
             inputs = columns[number.path].reshape(samples, -1)[whole].ravel()
             # About the mean, because the sums of the lines below cancel.
             changes.append(_change(values - np.mean(values), inputs, ends, part, confidence))
@@ -425,13 +512,13 @@ def finding_of(found: Influences) -> Finding[Influences]:
             f"in {found.not_following:,} runs the reference is not followed; the indices include these runs"
         )
     for name, number in found.constant.items():
-        sentences.append(f"{name} is {of_metric(name).text(number)} in every run: no value influences it")
+        sentences.append(f"{name} is {ask.of_metric(name).text(number)} in every run: no value influences it")
     caption = f"Left: indices with confidence bands, {first} filled{''.join(f', {other} open' for other in others)}."
     caption += " Right: convergence of the largest indices with the sample size, in the colours and markers of the left"
     caption += " panel."
     if any(found.gains[:1]):
         caption += " Settings of the controller are recomputed in every run."
-    figure = Section(
+    figure = ask.Section(
         "Indices and their convergence",
         panels=partial(_panels, found),
         name="sensitivity",
@@ -441,7 +528,7 @@ def finding_of(found: Influences) -> Finding[Influences]:
         title=f"Sensitivity of {found.study}",
         is_detail=True,
     )
-    return Finding(
+    return ask.Finding(
         name="sensitivity",
         kicker="Sensitivity",
         title=f"Sensitivity of {found.study}",
@@ -451,25 +538,25 @@ def finding_of(found: Influences) -> Finding[Influences]:
     )
 
 
-def _part(found: Influences, metric: MetricSensitivity) -> Section:
+def _part(found: Influences, metric: MetricSensitivity) -> ask.Section:
     """Return a table with a row for each uncertain value, the most influential first, with remarks.
 
     The remarks are on neighbours in the ranking whose bands overlap, and on the sum of first-order indices. Values
     surely below a hundredth of the largest index are left out as negligible. A difference of the sum from 1 within its
     error is not attributed to interactions.
     """
-    kind, indices, remarks = of_metric(metric.metric, "+.3g"), metric.indices, list[str]()
+    kind, indices, remarks = ask.of_metric(metric.metric, "+.3g"), metric.indices, list[str]()
     ranking, reach = indices.ranking, next(iter(indices.bands.values()))
     order = np.argsort(-ranking).tolist()
-    columns = [Column("value", [found.paths[row] for row in order])]
+    columns = [ask.Column("value", [found.paths[row] for row in order])]
     for name, values in indices.values.items():
-        columns.append(Column(_TITLES[name], [f"{round(values[row], 3) + 0.0:.3f}" for row in order]))
-        columns.append(Column("band", [f"± {indices.bands[name][row]:.3f}" for row in order]))
+        columns.append(ask.Column(_TITLES[name], [f"{round(values[row], 3) + 0.0:.3f}" for row in order]))
+        columns.append(ask.Column("band", [f"± {indices.bands[name][row]:.3f}" for row in order]))
     changes = [metric.change_from_5_to_95_percent[row] for row in order]
     ends = [f"± {kind.change_number(metric.band_of_change[row], '.2g')}" for row in order]
     bands = [None if math.isnan(change) else end for change, end in zip(changes, ends, strict=True)]
-    columns += [Column("change, 5 to 95 %", changes, kind, is_change=True), Column("band", bands)]
-    mean = of_metric(metric.metric).number(metric.mean)
+    columns += [ask.Column("change, 5 to 95 %", changes, kind, is_change=True), ask.Column("band", bands)]
+    mean = ask.of_metric(metric.metric).number(metric.mean)
     heading = f"{metric.metric}: mean {mean}, sd {kind.change(metric.standard_deviation)}"
     if dropped := indices.blocks - indices.used:
         heading += f"; {dropped:,} of {found.samples:,} {found.noun} left out"
@@ -487,49 +574,56 @@ def _part(found: Influences, metric: MetricSensitivity) -> Section:
         rest = "; the rest comes from interactions"
         rest = rest if alone + error < 1.0 else ": interactions, if any, are within this error"
         remarks.append(f"first-order indices sum to {alone:.3f} ± {error:.2g}{rest}")
-    return Section(heading, columns, remarks=remarks)
+    return ask.Section(heading, columns, remarks=remarks)
 
 
 # A function with a name: a lambda in a report cannot be pickled.
-def _panels(found: Influences) -> list[Panel]:
+def _panels(found: Influences) -> list[ask.Panel]:
     """Return two panels for each metric: its indices with their bands, and the largest for growing parts of the sample.
 
     A row and a colour are of a value, grey beyond the values of the second panel; a second index has open markers.
     """
 
-    def name_values(axes: "Axes", places: NDArray[np.intp], labels: Sequence[str]) -> None:
+    def name_values(axes: Axes, places: NDArray[np.intp], labels: Sequence[str]) -> None:
         axes.set_yticks(places, labels)
         axes.axvline(0.0, color="#9a9a9a", linewidth=0.8)
 
-    def set_sizes(axes: "Axes", sizes: Sequence[int]) -> None:
+    def set_sizes(axes: Axes, sizes: Sequence[int]) -> None:
         """Make the axis of the sizes logarithmic, with ticks at the largest size and at even steps below."""
         axes.set_xscale("log", base=2)
         ticks = sizes[:: -math.ceil(len(sizes) / _MOST_SIZES)]
         axes.set_xticks(ticks, [str(size) for size in ticks])
         axes.minorticks_off()
 
-    panels = list[Panel]()
+    panels = list[ask.Panel]()
     for metric in found.metrics:
-        indices, order, bars, courses = metric.indices, np.argsort(-metric.indices.ranking), list[Mark](), list[Mark]()
-        colours = [COLOURS[rank] if rank < _MAXIMUM_LINES else GREY for rank in range(order.size)]
+        indices, order, bars, courses = (
+            metric.indices,
+            np.argsort(-metric.indices.ranking),
+            list[ask.Mark](),
+            list[ask.Mark](),
+        )
+        colours = [ask.COLOURS[rank] if rank < _MAXIMUM_LINES else ask.GREY for rank in range(order.size)]
         places = np.arange(order.size)[::-1]
         for (name, values), filled, shift in zip(indices.values.items(), ("full", "none"), (0.14, -0.14), strict=False):
             for row, colour, place in zip(order, colours, places, strict=True):
-                style = {"markersize": 5, "elinewidth": 1.4, "fillstyle": filled, "fmt": MARKERS.get(colour, "o")}
+                style = {"markersize": 5, "elinewidth": 1.4, "fillstyle": filled, "fmt": ask.MARKERS.get(colour, "o")}
                 # One entry of the legend for each index: the markers of the first row.
                 label = _TITLES[name] if row == order[0] and len(indices.values) > 1 else ""
                 at = [values[row]], [place + shift], [indices.bands[name][row]]
-                bars.append(Mark("reach", *at, label, colour, style))
+                bars.append(ask.Mark("reach", *at, label, colour, style))
         name, sizes = next(iter(indices.values)), [step.blocks for step in metric.settling]
         settled = np.array([[step.values[name], step.bands[name]] for step in metric.settling])
         for row, colour in zip(order[:_MAXIMUM_LINES], colours, strict=False):
             values, bands = settled[:, :, row].T
-            line = {"marker": MARKERS.get(colour, "o"), "markersize": 3.5, "linewidth": 1.2}
-            courses.append(Mark("line", sizes, values, colour=colour, style=line))
-            courses.append(Mark("band", sizes, np.stack([values - bands, values + bands]), colour=colour))
-        named = partial(name_values, places=places, labels=[label_of(found.paths[row]) for row in order])
-        words, title = of_metric(metric.metric).words, f"{_TITLES[name].capitalize()}, {len(courses) // 2} largest"
-        axis = Kind(found.noun.capitalize())
-        panels.append(Panel(Kind("Fraction of the variance"), Kind(), bars, words, legend="figure", then=named))
-        panels.append(Panel(axis, Kind(), courses, title, then=partial(set_sizes, sizes=sizes)))
+            line = {"marker": ask.MARKERS.get(colour, "o"), "markersize": 3.5, "linewidth": 1.2}
+            courses.append(ask.Mark("line", sizes, values, colour=colour, style=line))
+            courses.append(ask.Mark("band", sizes, np.stack([values - bands, values + bands]), colour=colour))
+        named = partial(name_values, places=places, labels=[ask.label_of(found.paths[row]) for row in order])
+        words, title = ask.of_metric(metric.metric).words, f"{_TITLES[name].capitalize()}, {len(courses) // 2} largest"
+        axis = ask.Kind(found.noun.capitalize())
+        panels.append(
+            ask.Panel(ask.Kind("Fraction of the variance"), ask.Kind(), bars, words, legend="figure", then=named)
+        )
+        panels.append(ask.Panel(axis, ask.Kind(), courses, title, then=partial(set_sizes, sizes=sizes)))
     return panels
