@@ -1,17 +1,17 @@
 """Vocabulary of the questions: what they take from the packages below, by one import."""
 
 from ppafo.arguments.values import taken_tasks
-from ppafo.loading import scenario_or_load, with_overrides
+from ppafo.loading import load_scenario, placed, reloaded, scenario_or_load, usage_text, with_overrides
 from ppafo.metrics import METRICS, Metric
 from ppafo.metrics.tracking import TRACKING
 from ppafo.parameters.overrides import over
 from ppafo.parameters.parameter_set import PATHS_THAT_SET_UNITS, units_of_texts
 from ppafo.remedy_trials import verdict_of
 from ppafo.report.finding import Column, Finding, Section, columns_of
-from ppafo.report.kind import ConfidenceInterval, Kind, of_metric, of_path
+from ppafo.report.kind import TIME, ConfidenceInterval, Kind, of_metric, of_path
 from ppafo.report.panels import Mark, Panel, dots
 from ppafo.report.setting_names import label_of
-from ppafo.report.style import BLACK, BLUE, COLOURS, GREEN, GREY, MARKERS, VERMILION, look_of_valve
+from ppafo.report.style import BLACK, BLUE, COLOURS, GREEN, GREY, MARKERS, ORANGE, PURPLE, VERMILION, look_of_valve
 from ppafo.running import simulate
 from ppafo.simulation.declaration import changes_reach
 from ppafo.simulation.ensemble.running import lacking
@@ -22,7 +22,7 @@ from ppafo.simulation.tracking import Tracking
 from ppafo.simulation.tracking.remarks import standing_still
 from ppafo.simulation.tracking.remedies import change_text
 from ppafo.simulation.tracking.rule import CRITERION_TEXTS, shortfall
-from ppafo.studies.distributions import Floats
+from ppafo.studies.distributions import Distribution, Floats
 from ppafo.studies.draws import (
     FEWEST_DRAWS,
     MAXIMUM_DRAWS,
@@ -39,8 +39,8 @@ from ppafo.studies.intervals import (
     replicates_interval,
     share_interval,
 )
-from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, level_of
-from ppafo.studies.loading import drawn_in, study_of
+from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, difference_of, level_of
+from ppafo.studies.loading import drawn_in, list_studies, load_study, read_source, study_of
 from ppafo.studies.study import DEFAULT_SEED, Configuration, configurations_with
 from ppafo.studies.varying import VariedPath, distribution_in, value_at, varied_path
 from ppafo.study.blocks import unvaried

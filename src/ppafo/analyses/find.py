@@ -125,8 +125,7 @@ def find(
     base = ask.with_overrides(ask.scenario_or_load(scenario), overrides)
     # As in 'supply.pressure=2..6 bar_g' and 'final_error <= 30 N cm'.
     ranged = vary.rpartition("..")[2] if vary.strip().startswith(ask.PATHS_THAT_SET_UNITS) else ""
-    given = ask.units_of_texts((ranged, such_that.rpartition("=")[2]))
-    with shown_in({**base.device.shown, **given}):
+    with shown_in({**base.device.shown, **ask.units_of_texts((ranged, such_that.rpartition("=")[2]))}):
         with at_fault("vary"):
             path, low, high = _range(vary, base)
         with at_fault("such_that"):
@@ -136,9 +135,7 @@ def find(
         # The same streams for all values, so that neighbours differ by the value alone.
         seeds = ask.seeds_of_noise([base], [path.path], _STREAMS, _SEED)
         streams, reach_varies = max(1, seeds.size), ask.changes_reach([path.path])
-        wanted = "highest" if highest else "lowest"
-        counter = ask.RunCounter(grid * streams, progress)
-        runs = ask.scenario_runs(base, [limit.metric], counter, (), threads)
+        runs = ask.scenario_runs(base, [limit.metric], ask.RunCounter(grid * streams, progress), (), threads)
 
         def tried(values: ask.Floats) -> ask.Rows:
             columns = {path.path: np.tile(values, streams)}
@@ -147,26 +144,27 @@ def find(
             return judged(runs.run(columns), limit, reach_varies, streams)
 
         rows, index, outer = outermost(tried, low, high, grid, highest)
-        values, is_met, remarks = rows["value"], rows["is_met"], []
-        shown = [] if index is None or limit.text != FOLLOWS else [index]
+        values, is_met, remarks = rows["value"], rows["is_met"], list[str]()
         if not np.isfinite(rows["judged"]).any():
             ends, why = f"from {path.quote(low)} to {path.quote(high)}", runs.reason and f"the first: {runs.reason}"
             fault = f"no run {ends} gives the metric '{limit.metric}'"
             if rows["oscillating"].any():
                 fault, why = f"the loop oscillates in every run {ends}", _verdict(base, path, low, has_remedy=True)
             raise StudyError("; ".join(filter(None, (f"scenario '{base.name}': {fault}", why))))
-        nearest = int((np.nanargmin if limit.is_most else np.nanargmax)(rows["judged"])) if index is None else None
-        if nearest is not None and not rows["follows"][nearest]:
-            # A loop that fails even at the nearest value is why no value meets the condition.
-            shown = [nearest]
+        row = index
+        if row is None:
+            row = int((np.nanargmin if limit.is_most else np.nanargmax)(rows["judged"]))
+        # A loop that fails even at the nearest value is why no value meets the condition.
+        shown = [row] if (limit.text == FOLLOWS if index is not None else not rows["follows"][row]) else []
         if outer is not None:
             try:
                 ask.with_overrides(base, [f"{path.path}={float(values[outer])!r} {SI}"])
                 shown += [outer] if shown else []
             except (ParameterError, ScenarioError) as error:
+                wanted = "highest" if highest else "lowest"
                 remarks = [f"it is the {wanted} valid value, not the limit of the condition: {error}"]
         if not seeds.size:  # with noise a single run does not represent the mean over the noise streams
-            remarks += [_verdict(base, path, float(values[row]), index is None) for row in shown]
+            remarks += [_verdict(base, path, float(values[number]), index is None) for number in shown]
         remarks += [ask.remark_on_following_gains(base, [path.path]), base.origin.replaced]
         if runs.failures:
             remarks.append(f"{runs.failures} of {runs.count} runs failed: not met; the first: {runs.reason}")
@@ -178,11 +176,11 @@ def find(
             condition=limit.text,
             metric=limit.metric,
             limit=limit.limit,
-            wanted=wanted,
+            wanted="highest" if highest else "lowest",
             said="",
             remarks=list(filter(None, remarks)),
             value=None if index is None else float(values[index]),
-            nearest=None if nearest is None else float(values[nearest]),
+            nearest=float(values[row]) if index is None else None,
             metric_at_value=None if index is None else float(rows["metric"][index]),
             not_met_at=None if outer is None else float(values[outer]),
             changes=int(np.count_nonzero(np.diff(is_met))),
@@ -193,7 +191,7 @@ def find(
             unsettled=int(rows["unsettled"].sum()),
             tried={name: column.tolist() for name, column in rows.items()},
         )
-        return _finding(found, rows, ask.of_path(path.path, found.unit, given=path.given), base)
+        return _finding(found, rows, row, ask.of_path(path.path, found.unit, given=path.given), base)
 
 
 def _range(text: str, base: Scenario) -> tuple[ask.VariedPath, float, float]:
@@ -202,14 +200,12 @@ def _range(text: str, base: Scenario) -> tuple[ask.VariedPath, float, float]:
     if parts is None:
         raise StudyError(f"{quoted} is not of the form PATH=LOW..HIGH, for example 'supply.pressure=20..90 psi_g'")
     name, lower, upper = parts.groups()
+    # As in '20..90 psi_g': the low end has the unit of the high one unless it says its own.
+    if not ask.split_quantity(lower)[1]:
+        lower = f"{lower} {ask.split_quantity(upper)[1]}".rstrip()
     with refused_as(StudyError, quoted, ScenarioError, UnitError):
         path = ask.varied_path(name, base, [upper])
-        # As in '20..90 psi_g': the low end has the unit of the high one unless it says its own.
-        if not ask.split_quantity(lower)[1]:
-            lower = f"{lower} {ask.split_quantity(upper)[1]}".rstrip()
-        low, high = path.level(lower), path.level(upper)
-    if not low < high:
-        raise StudyError(f"{quoted}: the lower end must be below the upper end")
+        low, high = ask.distribution_in({"kind": "uniform", "minimum": lower, "maximum": upper}, path).numbers
     return path, low, high
 
 
@@ -320,21 +316,22 @@ def _verdict(base: Scenario, path: ask.VariedPath, value: float, has_remedy: boo
     return said and f"at {path.quote(value, '.9g')} {said}"
 
 
-def _finding(found: Threshold, rows: ask.Rows, kind: ask.Kind, base: Scenario) -> Finding[Threshold]:
-    """Return a search as a finding: sentences, table of intervals that meet the condition, metric over value."""
+def _finding(found: Threshold, rows: ask.Rows, row: int, kind: ask.Kind, base: Scenario) -> Finding[Threshold]:
+    """Return a search as a finding: sentences, table of intervals that meet the condition, metric over value.
+
+    ``row`` is that of the value found, or of the nearest one.
+    """
     values, of_limit, is_verdict = rows["value"], ask.of_metric(found.metric), found.condition == FOLLOWS
     # Values that meet the condition although the run does not follow its reference.
     missed = 0 if is_verdict else int(np.count_nonzero(~rows["follows"] & rows["is_kept"]))
     meets = "lets the run follow its reference" if is_verdict else f"meets {found.condition}"
     meets += " and follows its reference" * bool(missed)
-    row = int(np.searchsorted(values, next(each for each in (found.value, found.nearest) if each is not None)))
     name, number = found.metric, float(rows["metric"][row])
     if rows["judged"][row] > number:
         name, number = _SETTLED, float(rows["judged"][row])
-    used, remarks = "", [*found.remarks]
+    used, remarks, there = "", [*found.remarks], "" if is_verdict else f"{name} of {of_limit.text(number)} at "
     if found.value is None:
         # The nearest one says whether a wider range could.
-        there = "" if is_verdict else f"{name} of {of_limit.text(number)} at "
         ends = f"from {kind.text(values[0])} to {kind.text(values[-1])}"
         said = f"none of the {values.size} values of {found.path} {ends} {meets}; the nearest is {there}"
         said += kind.text(values[row])
@@ -402,22 +399,18 @@ def _panel(found: Threshold, rows: ask.Rows, kind: ask.Kind, of_limit: ask.Kind,
         # The excess decides whether a run follows; it has no larger number beside it.
         metric = number = rows["excess"]
         of_limit, limit = ask.Kind("Largest tracking number over its limit"), 1.0
-    of_grid, is_met, turns = rows["is_of_grid"], rows["is_met"], rows["oscillating"] > 0
-    marks = [ask.Mark("line", values, metric)]
-    groups: tuple[tuple[Any, ask.Floats, str, str, dict[str, Any]], ...] = (
-        (of_grid & is_met, metric, "", ask.BLUE, {"marker": "o"}),
-        (of_grid & ~is_met, metric, "", ask.BLUE, {"marker": "o", "markerfacecolor": "white"}),
-        (of_grid & turns, metric, "the loop oscillates", ask.BLACK, {"marker": "x", "markersize": 7}),
+    of_grid, is_met, marks = rows["is_of_grid"], rows["is_met"], [ask.Mark("line", values, metric)]
+    for which, numbers, marker, label, colour, style in (
+        (of_grid & is_met, metric, "o", "", ask.BLUE, {}),
+        (of_grid & ~is_met, metric, "o", "", ask.BLUE, {"markerfacecolor": "white"}),
+        (of_grid & (rows["oscillating"] > 0), metric, "x", "the loop oscillates", ask.BLACK, {"markersize": 7}),
         # The RMS error where that is larger, and what the condition is asked of.
-        (number > metric, number, f"{_SETTLED}, if it swings", ask.GREY, {"marker": "+", "markersize": 6}),
-    )
-    for which, numbers, label, colour, style in groups:
+        (number > metric, number, "+", f"{_SETTLED}, if it swings", ask.GREY, {"markersize": 6}),
+    ):
         if which.any():
-            dots = {"linestyle": "", "markersize": 4, **style}
-            marks.append(ask.Mark("line", values[which], numbers[which], label=label, colour=colour, style=dots))
-    marks.append(
-        ask.Mark("level", (), limit, label="limit", colour=ask.BLACK, style={"linestyle": "--", "linewidth": 1.0})
-    )
+            marks.append(ask.dots(values[which], numbers[which], marker, label, colour, **{"markersize": 4, **style}))
+    dashed = {"linestyle": "--", "linewidth": 1.0}
+    marks.append(ask.Mark("level", (), limit, label="limit", colour=ask.BLACK, style=dashed))
     marks += [ask.Mark("span", ends, label="" if row else met, colour=ask.GREEN) for row, ends in enumerate(found.met)]
     if found.value is not None:
         text = f"found: {kind.number(found.value, '.4g')} {kind.axis_unit}".rstrip()

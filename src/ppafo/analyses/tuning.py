@@ -12,44 +12,23 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
-import numpy as np
-
+from ppafo.analyses import ask, np
 from ppafo.arguments import Overrides, checked
 from ppafo.documents.toml_text import TomlKind, beside
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, refused_as
 from ppafo.linear_algebra import on_one_thread
-from ppafo.loading import load_scenario, placed, reloaded, usage_text, with_overrides
-from ppafo.metrics import Metric
 from ppafo.metrics.metric import controlled_in
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import Number
 from ppafo.parameters.declared import SHORT_NAME, Words
-from ppafo.parameters.overrides import over
 from ppafo.parameters.records import SchemaVersion, checked_record, keyed, record_schema
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report, report_nothing
-from ppafo.remedy_trials import verdict_of
-from ppafo.report.finding import Column, Finding, Section, columns_of
-from ppafo.report.kind import TIME, Kind, of_metric
-from ppafo.report.panels import Mark, Panel, dots
-from ppafo.report.setting_names import label_of
-from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILION
-from ppafo.simulation.numbers import NOISE_SEED, changes_in
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
-from ppafo.simulation.simulate import Result, simulate
-from ppafo.studies.distributions import Distribution, Floats
-from ppafo.studies.draws import Uncertainty, uncertainty_of
-from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, difference_of, level_of
-from ppafo.studies.loading import list_studies, load_study, read_source
-from ppafo.studies.varying import VariedPath, distribution_in, value_at, varied_path
-from ppafo.study.runs import Rows, RunCounter, scenario_runs
 from ppafo.units.shown import in_units, quantity_of_unit
 from ppafo.wording import count_of, first_twice, percentage, without_exponent
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 MAXIMUM_DRAWS, NOISE_STREAMS, FRESH_DRAWS = 4096, 16, 1024
 """Largest number of draws of each candidate, number of noise streams if only the sensors are uncertain, and number of
@@ -63,10 +42,10 @@ _AT_BOUND, _AS_GOOD, _DIFFERENT = 0.01, 0.01, 0.1
 """Fraction of the range from a bound that counts as at the bound, relative excess of an equally good cost, and fraction
 of the range above which two starts count as ended at different gains."""
 _START_LINES: tuple[tuple[str, Any], ...] = (
-    (GREEN, "--"),
-    (PURPLE, ":"),
-    (ORANGE, "-."),
-    (GREY, (0, (6, 1, 1, 1, 1, 1))),
+    (ask.GREEN, "--"),
+    (ask.PURPLE, ":"),
+    (ask.ORANGE, "-."),
+    (ask.GREY, (0, (6, 1, 1, 1, 1, 1))),
 )
 """Colours and dashes of the starts of a search; the gains before and after have other colours."""
 _BEYOND, _DECADE = 0.05, 10.0
@@ -173,8 +152,8 @@ TUNING = TomlKind("tuning", "tuning", resources.files("ppafo") / "analyses" / "t
 class SearchedParameter:
     """Searched parameter: path with its units, uniform or log-uniform range, and value before tuning [SI]."""
 
-    place: VariedPath
-    range: Distribution
+    place: ask.VariedPath
+    range: ask.Distribution
     before: float
 
     def quote(self, fraction: float) -> str:
@@ -195,11 +174,11 @@ class Problem:
     scenario: Scenario
     searched: tuple[SearchedParameter, ...]
     goals: tuple[ObjectiveTerm, ...]
-    constraints: tuple[MetricLimit, ...]
+    constraints: tuple[ask.MetricLimit, ...]
     effort: SearchEffort
     scales: Mapping[str, float] = field(default_factory=dict)
     changes: tuple[str, ...] = ()
-    uncertainty: Uncertainty = field(default_factory=partial(Uncertainty, ()))
+    uncertainty: ask.Uncertainty = field(default_factory=partial(ask.Uncertainty, ()))
     robust: Robust | None = None
     draws: int = 1
     seed: int = 0
@@ -219,7 +198,7 @@ class Problem:
         """Values of the gains before tuning [SI]."""
         return {gain.place.path: gain.before for gain in self.searched}
 
-    def bad_end(self, values: Floats, is_high: bool) -> Floats:
+    def bad_end(self, values: ask.Floats, is_high: bool) -> ask.Floats:
         """Return the unfavourable end of values (candidates, draws) [SI], high or low, as an array (candidates,)."""
         if not self.uncertainty.drawn:
             return values[:, 0]
@@ -280,8 +259,8 @@ class GainResult:
     fresh_violation: float
     fresh_share_without_value: float
     beyond_reach: float
-    metrics: Mapping[str, Metric]
-    result: Result = field(compare=False, repr=False)
+    metrics: Mapping[str, ask.Metric]
+    result: ask.Result = field(compare=False, repr=False)
 
     @property
     def is_feasible(self) -> bool:
@@ -347,33 +326,33 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
     controller.derivative_gain
     """
     name_plugins(plugins)
-    document, source = read_source(TUNING, tuning)
+    document, source = ask.read_source(TUNING, tuning)
     parsed = checked_record(TuningFile, document, source.file, StudyError, source.text)
     robust, paths = parsed.robust, [gain.path for gain in parsed.search]
     with refused_as(StudyError, source.file, ScenarioError, ParameterError, StudyError):
-        scenario = load_scenario(placed(parsed.scenario, source.folder), parsed.overrides)
-        scenario = reloaded(scenario, overrides) if overrides else scenario
+        scenario = ask.load_scenario(ask.placed(parsed.scenario, source.folder), parsed.overrides)
+        scenario = ask.reloaded(scenario, overrides) if overrides else scenario
         metrics = [*(goal.metric for goal in parsed.objective), *(limit.metric for limit in parsed.constraints)]
-        check_metrics(list(dict.fromkeys(metrics)), scenario)
-        uncertainty, seed = Uncertainty(()).with_noise_of([scenario]), parsed.effort.seed
+        ask.check_metrics(list(dict.fromkeys(metrics)), scenario)
+        uncertainty, seed = ask.Uncertainty(()).with_noise_of([scenario]), parsed.effort.seed
         if robust is not None:
             with refused_as(StudyError, "robust", StudyError):
-                study = load_study(beside(robust.study, source.folder, list_studies()))
-                uncertainty, seed = uncertainty_of(study).with_noise_of([scenario]), study.sample.seed
+                study = ask.load_study(beside(robust.study, source.folder, ask.list_studies()))
+                uncertainty, seed = ask.uncertainty_of(study).with_noise_of([scenario]), study.sample.seed
                 if (path := next(iter(study.only), None)) is not None:
                     raise StudyError(f"'{path}' varies in some configurations only; choose a study without 'only'")
                 if (path := next((path for path in uncertainty.paths if path in paths), None)) is not None:
                     raise StudyError(f"study '{study.name}' draws '{path}', which is also searched; omit one of both")
         if (repeated := first_twice(paths)) is not None:
             raise StudyError(f"'{repeated}' appears in two [[search]] tables; omit one")
-        atmosphere = atmosphere_of(scenario, (*uncertainty.paths, *uncertainty.same, *paths))
+        atmosphere = ask.atmosphere_of(scenario, (*uncertainty.paths, *uncertainty.same, *paths))
         scales = dict[str, float]()
         for goal in parsed.objective:
             if goal.weight == 0.0:
                 raise StudyError(f"objective '{goal.metric}': weight = 0 has no effect; omit this objective")
             if goal.scale is not None:
                 where = f"objective '{goal.metric}': scale = '{goal.scale}'"
-                scales[goal.metric] = difference_of(goal.scale, goal.metric, where)
+                scales[goal.metric] = ask.difference_of(goal.scale, goal.metric, where)
                 if scales[goal.metric] <= 0.0:
                     raise StudyError(f"{where}: must be above 0")
         return Problem(
@@ -385,7 +364,7 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
             constraints=tuple(_metric_limit(constraint, atmosphere) for constraint in parsed.constraints),
             effort=parsed.effort,
             scales=scales,
-            changes=changes_in(scenario, overrides=overrides),
+            changes=ask.changes_in(scenario, overrides=overrides),
             robust=robust,
             uncertainty=uncertainty,
             draws=(NOISE_STREAMS if robust is None else robust.draws) if uncertainty.drawn else 1,
@@ -393,7 +372,7 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
         )
 
 
-def _metric_limit(constraint: Constraint, atmosphere: float | None) -> MetricLimit:
+def _metric_limit(constraint: Constraint, atmosphere: float | None) -> ask.MetricLimit:
     """Return the limit of a constraint in SI; StudyError unless it has exactly one of at_most and at_least.
 
     Gauge pressures are relative to ``atmosphere`` [Pa absolute], and refused if it is None because it varies.
@@ -402,19 +381,19 @@ def _metric_limit(constraint: Constraint, atmosphere: float | None) -> MetricLim
     if len(bounds) != 1:
         has = "both" if bounds else "neither"
         raise StudyError(f"constraint '{constraint.metric}': has {has} of at_most and at_least; give one of them")
-    limit = level_of(bounds[0], constraint.metric, f"constraint '{constraint.metric}' = '{bounds[0]}'", atmosphere)
-    return MetricLimit(constraint.metric, limit, constraint.at_most is not None, bounds[0])
+    limit = ask.level_of(bounds[0], constraint.metric, f"constraint '{constraint.metric}' = '{bounds[0]}'", atmosphere)
+    return ask.MetricLimit(constraint.metric, limit, constraint.at_most is not None, bounds[0])
 
 
 def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) -> SearchedParameter:
     """Return a searched parameter with its range in SI; StudyError for a path or bounds that cannot be searched."""
     kind = "log_uniform" if gain.spacing == "logarithmic" else "uniform"
     with refused_as(StudyError, f"search '{gain.path}'", UnitError, ScenarioError, StudyError):
-        if gain.path == NOISE_SEED:
+        if gain.path == ask.NOISE_SEED:
             raise StudyError("cannot be searched, because all candidates use the same noise; omit this search")
-        place = varied_path(gain.path, scenario, (gain.minimum, gain.maximum), atmosphere_varies)
-        between = distribution_in({"kind": kind, "minimum": gain.minimum, "maximum": gain.maximum}, place)
-        if (before := value_at(gain.path, scenario)) is None:
+        place = ask.varied_path(gain.path, scenario, (gain.minimum, gain.maximum), atmosphere_varies)
+        between = ask.distribution_in({"kind": kind, "minimum": gain.minimum, "maximum": gain.maximum}, place)
+        if (before := ask.value_at(gain.path, scenario)) is None:
             raise StudyError(
                 f"scenario '{scenario.name}' has no value for '{gain.path}'; set it in the scenario or by an override"
             )
@@ -424,7 +403,7 @@ def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) ->
 
 def solve_tuning(
     problem: Problem, threads: int | None, progress: Report | None, executor: Executor | None = None
-) -> Finding[Tuned]:
+) -> ask.Finding[Tuned]:
     """Solve a tuning problem: search for gains, and evaluation of the gains before and after."""
     scenario, effort, uncertainty, report = (
         problem.scenario,
@@ -436,16 +415,16 @@ def solve_tuning(
     # before run for the scales and for their result, the gains found once, and both over fresh draws.
     of_start = len(problem.searched) * (effort.candidates_per_gain * (effort.generations + 1) + _REFINEMENTS)
     most = problem.draws * (effort.starts * of_start + 3) + 2 * FRESH_DRAWS * bool(uncertainty.drawn)
-    counter = RunCounter(most, lambda now: report(replace(now, activity="tuning", is_bound=True)))
+    counter = ask.RunCounter(most, lambda now: report(replace(now, activity="tuning", is_bound=True)))
     gauge = uncertainty.gauge | {gain.place.path for gain in problem.searched if gain.place.is_gauge}
     # The fresh draws follow those of the search: the gains were not chosen on them.
     draws, fresh = (
         uncertainty.random_columns(first, count, problem.seed) if uncertainty.drawn else {}
         for first, count in ((0, problem.draws), (problem.draws, FRESH_DRAWS))
     )
-    runs = scenario_runs(scenario, [*problem.is_worse_high], counter, gauge, threads, executor)
+    runs = ask.scenario_runs(scenario, [*problem.is_worse_high], counter, gauge, threads, executor)
 
-    def tried(candidates: Sequence[Gains], draws: Mapping[str, Floats]) -> Rows:
+    def tried(candidates: Sequence[Gains], draws: Mapping[str, ask.Floats]) -> ask.Rows:
         """Run every candidate with every draw; returns arrays (candidates, draws), one draw without uncertainty."""
         count = len(next(iter(draws.values()), (0.0,)))
         columns = {path: np.repeat([gains[path] for gains in candidates], count) for path in problem.before}
@@ -463,7 +442,7 @@ def solve_tuning(
                 "set scale = 'VALUE UNIT' in this objective"
             )
 
-    def costs(fractions: Floats) -> Floats:
+    def costs(fractions: ask.Floats) -> ask.Floats:
         # As they are pasted: what keeps a constraint by less than the last digit would break it.
         return judge(tried([problem.gains(each) for each in fractions.tolist()], draws), problem, scales)["cost"]
 
@@ -474,9 +453,9 @@ def solve_tuning(
         scores, fresh_scores = (judge(rows, problem, scales) for rows in (in_search, over_fresh))
         # Unchanged gains are not written and read again, which would round them.
         is_changed = gains != problem.before
-        result = simulate(with_overrides(scenario, problem.lines(gains)) if is_changed else scenario)
+        result = ask.simulate(ask.with_overrides(scenario, problem.lines(gains)) if is_changed else scenario)
 
-        def ends(rows: Rows, prefix: str = "") -> dict[str, float]:
+        def ends(rows: ask.Rows, prefix: str = "") -> dict[str, float]:
             worse = problem.is_worse_high.items()
             return {name: float(problem.bad_end(rows[prefix + name], high)[0]) for name, high in worse}
 
@@ -504,14 +483,14 @@ def solve_tuning(
         fraction = gain.range.fraction(after.gains[gain.place.path])
         if not _AT_BOUND < fraction < 1.0 - _AT_BOUND:
             bounds[gain.place.path] = "minimum" if fraction <= _AT_BOUND else "maximum"
-    tracking, lines = verdict_of(after.result), problem.lines(after.gains)
+    tracking, lines = ask.verdict_of(after.result), problem.lines(after.gains)
     tuned = Tuned(
         tuning=problem.name,
         scenario=scenario.name,
         verdict=f"{problem.name}: {_verdict(problem, before, after, tracking.sentence if tracking.is_useless else '')}",
         is_feasible=after.is_feasible,
         follows=not tracking.is_useless,
-        overrides=list(over(scenario.origin.overrides, lines, valve=scenario.device.valve_name)),
+        overrides=list(ask.over(scenario.origin.overrides, lines, valve=scenario.device.valve_name)),
         lines=lines,
         bounds_reached=bounds,
         scales=scales,
@@ -525,7 +504,7 @@ def solve_tuning(
     return _finding(replace(tuned, remarks=_remarks(tuned)))
 
 
-def judge(rows: Rows, problem: Problem, scales: Mapping[str, float]) -> Rows:
+def judge(rows: ask.Rows, problem: Problem, scales: Mapping[str, float]) -> ask.Rows:
     """Score candidates, each (candidates,), by objective, constraints, tracking and runs without a value.
 
     ``scales`` are scales of the goals by metric [SI]. The scores are ``cost``, by which candidates are ranked,
@@ -554,7 +533,9 @@ def judge(rows: Rows, problem: Problem, scales: Mapping[str, float]) -> Rows:
 
 
 @on_one_thread
-def search(costs: Callable[[Floats], Floats], before: Sequence[float], effort: SearchEffort) -> list[SearchStart]:
+def search(
+    costs: Callable[[ask.Floats], ask.Floats], before: Sequence[float], effort: SearchEffort
+) -> list[SearchStart]:
     """Return the result of each start of the search, the best first; equal seeds give equal results.
 
     ``costs`` takes fractions of the ranges (candidates, gains). ``before`` are those before tuning; they are among the
@@ -563,9 +544,9 @@ def search(costs: Callable[[Floats], Floats], before: Sequence[float], effort: S
     """
     from scipy.optimize import differential_evolution, minimize
 
-    starts, batches, box = list[SearchStart](), list[Floats](), [(0.0, 1.0)] * len(before)
+    starts, batches, box = list[SearchStart](), list[ask.Floats](), [(0.0, 1.0)] * len(before)
 
-    def batch_costs(columns: Floats) -> Floats:
+    def batch_costs(columns: ask.Floats) -> ask.Floats:
         # SciPy has a candidate in each column, the costs one in each row.
         batches.append(costs(np.clip(np.atleast_2d(columns.T), 0.0, 1.0)))
         return batches[-1]
@@ -619,7 +600,7 @@ def search(costs: Callable[[Floats], Floats], before: Sequence[float], effort: S
     return sorted(starts, key=lambda start: start.cost)
 
 
-def _is_settled(costs: Floats) -> bool:
+def _is_settled(costs: ask.Floats) -> bool:
     """Return whether the costs of a generation have converged."""
     least, most = np.min(costs), np.max(costs)
     if most >= UNUSABLE or least < INFEASIBLE <= most:
@@ -699,7 +680,7 @@ def _remarks(tuned: Tuned) -> list[str]:
         )
     remarks += [
         f"the loop still oscillates in the second half of the hold, so {name} depends on the instant: the RMS error of "
-        f"that half, {of_metric(name).number(judged)}, counts instead"
+        f"that half, {ask.of_metric(name).number(judged)}, counts instead"
         for name, judged in after.judged.items()
         if judged > (after.fresh or after.values)[name]
     ]
@@ -707,7 +688,7 @@ def _remarks(tuned: Tuned) -> list[str]:
 
 
 @in_units(lambda tuned: tuned.problem.scenario.device.shown)
-def _finding(tuned: Tuned) -> Finding[Tuned]:
+def _finding(tuned: Tuned) -> ask.Finding[Tuned]:
     """Return the result of a tuning as a finding; it has passed if the gains satisfy all constraints."""
     problem, before, after, scenario = tuned.problem, tuned.before, tuned.after, tuned.problem.scenario
     rows = []
@@ -721,32 +702,32 @@ def _finding(tuned: Tuned) -> Finding[Tuned]:
         sides |= {"before, fresh draws": before.fresh, "after, fresh draws": after.fresh}
         for title, side in (("before, nominal", before), ("after, nominal", after)):
             sides[title] = {name: metric.value for name, metric in side.metrics.items()}
-    kinds = {name: of_metric(name) for name in problem.is_worse_high}
+    kinds = {name: ask.of_metric(name) for name in problem.is_worse_high}
     table = [
-        Column("metric", [f"{name} ({kind.shown_unit})" if kind.quantity else name for name, kind in kinds.items()])
+        ask.Column("metric", [f"{name} ({kind.shown_unit})" if kind.quantity else name for name, kind in kinds.items()])
     ]
     for title, own in sides.items():
         known = {name: kind.number(own.get(name, math.nan)) for name, kind in kinds.items()}
-        table.append(Column(title, ["" if text == "nan" else text for text in known.values()]))
+        table.append(ask.Column(title, ["" if text == "nan" else text for text in known.values()]))
     limits = ([limit.words for limit in problem.constraints if limit.metric == name] for name in kinds)
-    table.append(Column("constraint", [", ".join(words) for words in limits]))
+    table.append(ask.Column("constraint", [", ".join(words) for words in limits]))
     # The scenario's file, or the name of one that comes with the package, finds it again.
     name, command = scenario.origin.file or scenario.name, scenario.motion.motion_kind.command
     # Texts of TOML and of Python alike.
-    used = usage_text(reloaded(scenario, tuned.lines))
+    used = ask.usage_text(ask.reloaded(scenario, tuned.lines))
     listed = ", ".join(json.dumps(line, ensure_ascii=False) for line in tuned.overrides)
     pasted = (
         f"# {tuned.verdict}\n\n# on the command line\n{used}\n\n# in a study file\noverrides = [{listed}]\n\n"
         f"# in Python\nppafo.{command}({name!r}, overrides=[{listed}])\n"
     )
-    return Finding(
+    return ask.Finding(
         name="tune",
         kicker="Tuning",
         title=problem.name,
         said=(tuned.verdict, *([problem.description] if problem.description else [])),
         parts=(
-            Section("Gains", columns_of(("gain", "before", "after", "minimum", "maximum", ""), rows)),
-            Section(
+            ask.Section("Gains", ask.columns_of(("gain", "before", "after", "minimum", "maximum", ""), rows)),
+            ask.Section(
                 "Before and after",
                 table,
                 panels=partial(_task_panels, tuned),
@@ -754,7 +735,7 @@ def _finding(tuned: Tuned) -> Finding[Tuned]:
                 caption="The nominal device.",
                 size=(5.4, 1.9),
             ),
-            Section(
+            ask.Section(
                 "The search",
                 remarks=tuned.remarks,
                 panels=partial(_search_panels, tuned),
@@ -762,7 +743,7 @@ def _finding(tuned: Tuned) -> Finding[Tuned]:
                 caption=_SEARCH_CAPTION,
                 size=(5.4, max(2.2, 0.9 + 0.3 * len(problem.searched))),
             ),
-            Section("To use the gains", code=used),
+            ask.Section("To use the gains", code=used),
         ),
         found=tuned,
         passed=after.is_feasible and tuned.follows,
@@ -771,44 +752,46 @@ def _finding(tuned: Tuned) -> Finding[Tuned]:
     )
 
 
-def _task_panels(tuned: Tuned) -> list[Panel]:
+def _task_panels(tuned: Tuned) -> list[ask.Panel]:
     """Return panels of controlled quantity, command and gas over time, before and after, for the nominal device."""
     before, after = tuned.before.result.recording, tuned.after.result.recording
     controlled = controlled_in(after) or CONTROLLED[TORQUE]
     words, unit = controlled.words, controlled.level.unit
     kinds = {
-        controlled.name: Kind(words[:1].upper() + words[1:], unit, quantity_of_unit(unit)),
-        "command": Kind("Valve command"),
-        "supplied_mass": Kind("Gas supplied", "kg", "gas mass"),
+        controlled.name: ask.Kind(words[:1].upper() + words[1:], unit, quantity_of_unit(unit)),
+        "command": ask.Kind("Valve command"),
+        "supplied_mass": ask.Kind("Gas supplied", "kg", "gas mass"),
     }
-    panels: list[Panel] = []
+    panels: list[ask.Panel] = []
     for channel, kind in kinds.items():
         drawn: dict[str, Any] = {"drawstyle": "steps-post" if channel == "command" else "default"}
         # Broader below, so that both show where they agree.
         marks = [
-            Mark("line", own.time, own[channel], label=label, colour=colour, style={"linewidth": width, **drawn})
-            for own, colour, label, width in ((before, VERMILION, "before", 1.8), (after, BLUE, "after", 1.1))
+            ask.Mark("line", own.time, own[channel], label=label, colour=colour, style={"linewidth": width, **drawn})
+            for own, colour, label, width in ((before, ask.VERMILION, "before", 1.8), (after, ask.BLUE, "after", 1.1))
         ]
         if channel == controlled.name and controlled.reference in after:
             dashed, reference = {"linestyle": "--", "linewidth": 1.2}, after[controlled.reference]
-            marks.append(Mark("line", after.time, reference, label="reference", colour=BLACK, style=dashed))
-        panels.append(Panel(TIME, kind, marks, legend="" if panels else "figure", shares_x=True))
+            marks.append(ask.Mark("line", after.time, reference, label="reference", colour=ask.BLACK, style=dashed))
+        panels.append(ask.Panel(ask.TIME, kind, marks, legend="" if panels else "figure", shares_x=True))
     return panels
 
 
-def _search_panels(tuned: Tuned) -> list[Panel]:
+def _search_panels(tuned: Tuned) -> list[ask.Panel]:
     """Return panels of the best cost of each start over its generations, and of the gains between their bounds."""
-    searched, starts, courses = tuned.problem.searched, tuned.starts, list[Mark]()
+    searched, starts, courses = tuned.problem.searched, tuned.starts, list[ask.Mark]()
     for number, start in enumerate(starts):
         costs = np.array(start.generations)
         costs[costs >= INFEASIBLE] = np.nan  # no candidate keeps the constraints yet
         colour, dashes = _START_LINES[number % len(_START_LINES)]
         label = f"start {number + 1}" if len(starts) <= len(_START_LINES) else ""
         style = {"linewidth": 1.3, "linestyle": dashes}
-        courses.append(Mark("line", np.arange(costs.size), costs, label=label, colour=colour, style=style))
-    courses.append(Mark("level", y=tuned.before.objective, label="before", colour=BLACK, style={"linewidth": 0.8}))
+        courses.append(ask.Mark("line", np.arange(costs.size), costs, label=label, colour=colour, style=style))
+    courses.append(
+        ask.Mark("level", y=tuned.before.objective, label="before", colour=ask.BLACK, style={"linewidth": 0.8})
+    )
 
-    def scale(axes: "Axes") -> None:
+    def scale(axes: Any) -> None:
         axes.locator_params(axis="x", integer=True)
         # Below a decade a logarithmic axis has no tick that reads as a number.
         if axes.dataLim.ymax > _DECADE * axes.dataLim.ymin > 0.0:
@@ -819,14 +802,14 @@ def _search_panels(tuned: Tuned) -> list[Panel]:
     previous = np.clip([gain.range.fraction(gain.before) for gain in searched], -_BEYOND, 1.0 + _BEYOND)
     found = [gain.range.fraction(tuned.after.gains[gain.place.path]) for gain in searched]
     marks = (
-        *(Mark("line", [0.0, 1.0], [row, row], colour=GREY, style={"linewidth": 1.0}) for row in rows),
-        dots(ends, np.tile(rows, len(starts)), "|", "end of a start", BLACK, markersize=11),
-        dots(previous, rows, "s", "before", VERMILION, markersize=7),
-        dots(found, rows, "o", "after", BLUE, markersize=7),
+        *(ask.Mark("line", [0.0, 1.0], [row, row], colour=ask.GREY, style={"linewidth": 1.0}) for row in rows),
+        ask.dots(ends, np.tile(rows, len(starts)), "|", "end of a start", ask.BLACK, markersize=11),
+        ask.dots(previous, rows, "s", "before", ask.VERMILION, markersize=7),
+        ask.dots(found, rows, "o", "after", ask.BLUE, markersize=7),
     )
-    every = {"yticks": rows, "yticklabels": [label_of(gain.place.path) for gain in searched], "xticks": [0.0, 1.0]}
+    every = {"yticks": rows, "yticklabels": [ask.label_of(gain.place.path) for gain in searched], "xticks": [0.0, 1.0]}
     every |= {"ylim": (-0.6, len(searched) - 0.4), "xticklabels": ["minimum", "maximum"]}
     return [
-        Panel(Kind("Generation"), Kind(), courses, "Objective, best so far", legend="inside", then=scale),
-        Panel(Kind("Between bounds"), Kind(), marks, then=lambda axes: axes.set(**every)),
+        ask.Panel(ask.Kind("Generation"), ask.Kind(), courses, "Objective, best so far", legend="inside", then=scale),
+        ask.Panel(ask.Kind("Between bounds"), ask.Kind(), marks, then=lambda axes: axes.set(**every)),
     ]
