@@ -1,16 +1,15 @@
 """Trials of the remedies that a tracking verdict names: further runs, of which the first that follows is reported."""
 
 import contextlib
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ppafo.errors import PpafoError
 from ppafo.loading import reloaded
 from ppafo.model.controlled import TORQUE
-from ppafo.simulation import simulate as of_loaded
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import simulate_many
 from ppafo.units.shown import shown_in
 
 if TYPE_CHECKING:
@@ -41,39 +40,31 @@ def verdict_of(result: "Result | WalkResult") -> "Tracking":
     # Changes made in Python would be lost with overrides.
     is_of_file = replace(reloaded(scenario, ()), run=scenario.run) == scenario
     trials = _trials(scenario, verdict, is_of_file)
+    errors: list[tuple[Remedy, float]] = []
     if not trials:
         return verdict
     try:
-        judged = list(_judged(trials))
+        results = simulate_many([_first_strides(changed) for _, _, changed in trials])
+        for (cause, remedy, changed), early in zip(trials, results, strict=True):
+            left = early.tracking
+            # A loop that follows in the first strides of a walk need not follow in the later ones.
+            if left.passes and early.scenario.run.duration < changed.run.duration:
+                left = simulate_many([changed])[0].tracking
+            if left.follows is not None and left.passes:
+                # A number that was tried is one of many; a kind is none.
+                example = "for example, " * any(".kind=" not in text for text in remedy.overrides)
+                # Pressures are computed for more torque than is requested, but not for more angle.
+                is_pressure = any(text.startswith("supply.") for text in remedy.overrides)
+                margin = ", with a margin" * (is_pressure and scenario.controlled == TORQUE)
+                does = "it follows" if left.follows else "it gives what the actuator can give"
+                text = f"{example}with {remedy.text} {does}, as a further run shows{margin}"
+                return replace(verdict, cause=cause, tried=text, mended=remedy.overrides if is_of_file else ())
+            if left.fails and cause == verdict.cause:
+                errors.append((remedy, left.error))
     except PpafoError:
         return verdict
-    for cause, remedy, left in judged:
-        if left.passes:
-            # A number that was tried is one of many; a kind is none.
-            example = "for example, " * any(".kind=" not in text for text in remedy.overrides)
-            # Pressures are computed for more torque than is requested, but not for more angle.
-            has_margin = scenario.controlled == TORQUE and any(text.startswith("supply.") for text in remedy.overrides)
-            margin = ", with a margin" * has_margin
-            does = "it follows" if left.follows else "it gives what the actuator can give"
-            text = f"{example}with {remedy.text} {does}, as a further run shows{margin}"
-            return replace(verdict, cause=cause, tried=text, mended=remedy.overrides if is_of_file else ())
-    of_cause = [(remedy, left.error) for cause, remedy, left in judged if left.fails and cause == verdict.cause]
     strides = "" if _first_strides(scenario) is scenario else f" in the first {_STRIDES_TRIED:.0f} strides"
-    return replace(verdict, tried=_remainder_text(verdict, of_cause, strides))
-
-
-def _judged(trials: "list[tuple[str, Remedy, Scenario]]") -> "Iterator[tuple[str, Remedy, Tracking]]":
-    """Yield cause, remedy and verdict of the trials up to the first that follows; not of a run without a verdict."""
-    results = of_loaded.simulate_many([_first_strides(changed) for _, _, changed in trials])
-    for (cause, remedy, changed), early in zip(trials, results, strict=True):
-        # A loop that follows in the first strides of a walk need not follow in the later ones.
-        is_early = early.scenario.run.duration < changed.run.duration and early.tracking.passes
-        result = of_loaded.simulate_many([changed])[0] if is_early else early
-        tracking = result.tracking
-        if tracking.follows is not None:
-            yield cause, remedy, tracking
-            if tracking.passes:
-                return
+    return replace(verdict, tried=_remainder_text(verdict, errors, strides))
 
 
 def _first_strides(scenario: Scenario) -> Scenario:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 from ppafo.arguments import Overrides, Threads, checked
 from ppafo.arguments.values import accepted_values, shown
@@ -20,9 +20,6 @@ from ppafo.simulation.plan import plan_run
 from ppafo.simulation.sampled import SampledRun
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, result_of
-
-if TYPE_CHECKING:
-    from ppafo.simulation.gains import Gains
 
 _NUMBER = accepted_values(float)
 
@@ -55,14 +52,6 @@ def simulate(scenario: Scenario | str | Path, overrides: Overrides = (), *, plug
     """
     name_plugins(plugins)
     return replace(of_loaded.simulate(scenario_or_load(scenario, overrides)), tries=verdict_of)
-
-
-def gains(scenario: Scenario) -> "Gains | None":
-    """Return the gains of a scenario's torque controller; None for a controller without gains."""
-    from ppafo.simulation.gains import gains_of
-
-    law = scenario.law
-    return None if law is None else gains_of(scenario, law)
 
 
 @checked

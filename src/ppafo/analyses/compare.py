@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -580,8 +581,7 @@ def _tables(found: ComparisonResult, task: str) -> list[ask.Section]:
             named = ", ".join(case.configuration for case in following if case.value(metric) == least)
             best.append(f"best: {metric}: {named} ({kinds[metric].text(least)})")
     follow = ["-" if case.following is None else f"{case.following:,} of {found.draws:,}" for case in cases]
-    laws = ((case, case.scenario.law) for case in cases)
-    gains = ((case, ask.gains_of(case.scenario, law)) for case, law in laws if law is not None)
+    gains = ((case, ask.gains_of(case.scenario)) for case in cases)
     return [
         ask.Section(
             f"Task: {task}",
@@ -663,51 +663,49 @@ def _front_panels(found: ComparisonResult) -> list[ask.Panel]:
 
 
 def _change_panels(found: ComparisonResult) -> list[ask.Panel]:
-    return [_change(found, task, metric) for task in found.tasks for metric in (found.error, _GAS)]
+    """Return panels with histograms of the change of error and gas against the baseline; dashed: nominal device."""
+    panels = []
+    for (task, cases), metric in product(found.tasks.items(), (found.error, _GAS)):
+        colours, base = _colours(cases), next(case for case in cases if case.configuration == found.baseline)
+        marks, ends = list[ask.Mark](), list[float]()
+        for case in cases:
+            change = _relative(base.rows[metric], case.rows[metric]) if case is not base else np.zeros(0)
+            if change.size == 0:
+                continue
+            colour, (low, high) = colours[case.configuration], np.percentile(change, _SHOWN_PERCENTILES)
+            # Fewer bins for fewer draws, so that each has some of them.
+            counts, edges = np.histogram(change, min(_BINS, max(8, round(1.5 * change.size**0.5))), (low, high))
+            marks.append(ask.Mark("bars", edges, counts, label=case.configuration, colour=colour))
+            nominal = _relative(*(np.array([side.value(metric)]) for side in (base, case)))
+            dashed = {"linestyle": "--", "linewidth": 1.2}
+            # One dashed line of the legend stands for all.
+            said = "" if ends else "nominal device"
+            marks += [ask.Mark("at", value, label=said, colour=colour, style=dashed) for value in nominal]
+            ends += [float(low), float(high), *nominal.tolist()]
+        axis = ask.Kind(f"{ask.of_metric(metric).words}, change from {found.baseline}", "%")
+        panel = ask.Panel(
+            axis, ask.Kind(), marks, legend="figure", then=partial(_limit_changes, ends) if ends else None
+        )
+        if metric == found.error:
+            title = f"Task: {task}" if len(found.tasks) > 1 else ""
+            panel = replace(panel, y=ask.Kind("Draws"), title=title, legend="")
+        panels.append(panel)
+    return panels
 
 
-def _change(found: ComparisonResult, task: str, metric: str) -> ask.Panel:
-    """Return a panel with histograms of the change of a metric against the baseline; dashed: nominal device."""
-    cases, marks, ends = found.tasks[task], [], list[float]()
-    colours = _colours(cases)
-    base = next(case for case in cases if case.configuration == found.baseline)
-    for case in cases:
-        change = _relative(base.rows[metric], case.rows[metric]) if case is not base else np.zeros(0)
-        if change.size == 0:
-            continue
-        colour, (low, high) = colours[case.configuration], np.percentile(change, _SHOWN_PERCENTILES)
-        # Fewer bins for fewer draws, so that each has some of them.
-        counts, edges = np.histogram(change, min(_BINS, max(8, round(1.5 * change.size**0.5))), (low, high))
-        marks.append(ask.Mark("bars", edges, counts, label=case.configuration, colour=colour))
-        nominal = _relative(*(np.array([side.value(metric)]) for side in (base, case)))
-        dashed = {"linestyle": "--", "linewidth": 1.2}
-        # One dashed line of the legend stands for all.
-        said = "" if ends else "nominal device"
-        marks += [ask.Mark("at", value, label=said, colour=colour, style=dashed) for value in nominal]
-        ends += [float(low), float(high), *nominal.tolist()]
-    is_first = metric == found.error
-    title = f"Task: {task}" if len(found.tasks) > 1 and is_first else ""
+def _limit_changes(ends: Sequence[float], axes: Any) -> None:
+    """Limit the axis of the change to the ``ends`` of what is drawn, and to zero where it is near."""
+    from matplotlib.ticker import MaxNLocator
 
-    def limit_changes(axes: Any) -> None:
-        from matplotlib.ticker import MaxNLocator
-
-        # Zero is shown where it is near: far from all changes it would squeeze them into a few pixels.
-        low, high = min(ends, default=0.0), max(ends, default=0.0)
-        span = high - low or 1.0
-        if low - 0.5 * span <= 0.0 <= high + 0.5 * span:
-            axes.axvline(0.0, color=ask.BLACK, linewidth=0.8)
-            low, high = min(low, 0.0), max(high, 0.0)
-        axes.set_xlim(low - 0.08 * span, high + 0.08 * span)
-        axes.xaxis.set_major_locator(MaxNLocator(_TICKS_OF_CHANGE))
-        axes.locator_params(axis="y", integer=True)
-
-    axis, draws = (
-        ask.Kind(f"{ask.of_metric(metric).words}, change from {found.baseline}", "%"),
-        ask.Kind("Draws" * is_first),
-    )
-    return ask.Panel(
-        axis, draws, marks, title, legend="" if is_first else "figure", then=limit_changes if ends else None
-    )
+    # Far from all changes zero would squeeze them into a few pixels.
+    low, high = min(ends), max(ends)
+    span = high - low or 1.0
+    if low - 0.5 * span <= 0.0 <= high + 0.5 * span:
+        axes.axvline(0.0, color=ask.BLACK, linewidth=0.8)
+        low, high = min(low, 0.0), max(high, 0.0)
+    axes.set_xlim(low - 0.08 * span, high + 0.08 * span)
+    axes.xaxis.set_major_locator(MaxNLocator(_TICKS_OF_CHANGE))
+    axes.locator_params(axis="y", integer=True)
 
 
 def _relative(baseline: ask.Floats, other: ask.Floats) -> ask.Floats:

@@ -41,13 +41,8 @@ simplex for each gain, and its smallest and largest initial size, as a fraction 
 _AT_BOUND, _AS_GOOD, _DIFFERENT = 0.01, 0.01, 0.1
 """Fraction of the range from a bound that counts as at the bound, relative excess of an equally good cost, and fraction
 of the range above which two starts count as ended at different gains."""
-_START_LINES: tuple[tuple[str, Any], ...] = (
-    (ask.GREEN, "--"),
-    (ask.PURPLE, ":"),
-    (ask.ORANGE, "-."),
-    (ask.GREY, (0, (6, 1, 1, 1, 1, 1))),
-)
-"""Colours and dashes of the starts of a search; the gains before and after have other colours."""
+_START_COLOURS = (ask.GREEN, ask.PURPLE, ask.ORANGE, ask.GREY)
+"""Colours of the starts of a search; the gains before and after have other colours."""
 _BEYOND, _DECADE = 0.05, 10.0
 """Fraction of the range by which gains outside the bounds are drawn beyond them; ratio of a logarithmic axis' ends."""
 _SEARCH_CAPTION = (
@@ -783,10 +778,9 @@ def _search_panels(tuned: Tuned) -> list[ask.Panel]:
     for number, start in enumerate(starts):
         costs = np.array(start.generations)
         costs[costs >= INFEASIBLE] = np.nan  # no candidate keeps the constraints yet
-        colour, dashes = _START_LINES[number % len(_START_LINES)]
-        label = f"start {number + 1}" if len(starts) <= len(_START_LINES) else ""
-        style = {"linewidth": 1.3, "linestyle": dashes}
-        courses.append(ask.Mark("line", np.arange(costs.size), costs, label=label, colour=colour, style=style))
+        label = f"start {number + 1}" if len(starts) <= len(_START_COLOURS) else ""
+        colour = _START_COLOURS[number % len(_START_COLOURS)]
+        courses.append(ask.Mark("line", np.arange(costs.size), costs, label=label, colour=colour))
     courses.append(
         ask.Mark("level", y=tuned.before.objective, label="before", colour=ask.BLACK, style={"linewidth": 0.8})
     )

@@ -97,7 +97,7 @@ class _RunReport:
 def assessed(result: "Result", check: bool) -> _RunReport:
     """Assess a result for its report; ``check`` runs the scenario again to test its repeatability."""
     from ppafo.remedy_trials import verdict_of
-    from ppafo.running import gains
+    from ppafo.simulation.gains import gains_of
 
     scenario = result.scenario
     # A run that diverged has no result to repeat; its exit code says so already.
@@ -106,7 +106,7 @@ def assessed(result: "Result", check: bool) -> _RunReport:
     if error is None and result.status.is_completed and scenario.motion.motion_kind.layout == VANE:
         error = result.error()
     verdict = verdict_of(result)
-    return _RunReport(result, repeatability, error, verdict, result.sentences(verdict), gains(scenario))
+    return _RunReport(result, repeatability, error, verdict, result.sentences(verdict), gains_of(scenario))
 
 
 def _text(report: _RunReport) -> str:

@@ -66,9 +66,10 @@ def loop_of(scenario: Scenario, law: ControllerKind) -> TorqueLoop:
     return loop
 
 
-def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
+def gains_of(scenario: Scenario) -> Gains | None:
     """Return the gains in use of a scenario's torque controller; None for a controller without such gains."""
-    if scenario.controller.is_outside:
+    law = scenario.law
+    if law is None or scenario.controller.is_outside:
         return None
     settings = scenario.controller.settings
     items = [

@@ -9,8 +9,7 @@ import pytest
 import ppafo
 from ppafo.analyses.stored_figures import draw_folder, names_in
 from ppafo.parameters.parameter_set import written_units
-from ppafo.running import gains
-from ppafo.simulation.gains import remark_on_following_gains
+from ppafo.simulation.gains import gains_of, remark_on_following_gains
 from ppafo.studies.loading import load_study
 from ppafo.studies.varying import varied_path
 from ppafo.units.shown import shown_in, shown_text
@@ -69,7 +68,7 @@ def test_the_unit_of_a_controller_setting_or_a_sensor_is_of_that_number_alone(tm
     )
     assert load_walk("proportional", ["controller.peak_torque=900 N cm"]).device.shown["N m"] == "N cm"
     with shown_in(scenario.device.shown):
-        given = gains(scenario)
+        given = gains_of(scenario)
         assert given is not None
         assert "tolerance 0.5 deg (given)" in given.sentence
     remark = remark_on_following_gains(ppafo.load_scenario("swing-foot-angle"), ["actuator.torque_constant"])

@@ -8,8 +8,9 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.loading import load_scenario
-from ppafo.running import gains, simulate
+from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.gains import gains_of
 from ppafo.simulation.tracking import most_reversals
 from ppafo.walking import load_walk, walk
 
@@ -18,7 +19,7 @@ TASK = "torque-task-proportional"
 
 
 def test_given_gains_and_computed_ones_are_told_apart() -> None:
-    found = gains(load_walk("proportional", ["controller.torque_gain=2 1/(N m)"]))
+    found = gains_of(load_walk("proportional", ["controller.torque_gain=2 1/(N m)"]))
     assert found is not None
     assert [(item.name, item.computed) for item in found.gains] == [
         ("torque_gain", False),
@@ -26,7 +27,7 @@ def test_given_gains_and_computed_ones_are_told_apart() -> None:
     ]
     assert found.dead_time == 1.5e-3
     assert found.sentence.startswith("gains: torque_gain 2 1/(N m) (given); torque_integral_gain 167 ")
-    assert gains(load_scenario("step-response")) is None
+    assert gains_of(load_scenario("step-response")) is None
 
 
 def test_a_verdict_names_the_gain_that_mends_the_loop_and_it_does() -> None:

@@ -186,7 +186,7 @@ def test_gains_say_that_they_do_not_know_a_load_which_may_move_the_joint() -> No
     load = ("controller.kind=sliding_mode", "effects.joint_load.stiffness=2 N m/rad")
     free = load_scenario("torque-task-proportional", [*load, "motion.kind=free", "motion.angle=75 deg"])
     locked, worn = load_scenario("torque-task-proportional", load), load_walk("proportional", load[1:])
-    said = [gains_of(item, item.motion.motion_kind.law(item)) for item in (free, locked, worn)]
+    said = [gains_of(item) for item in (free, locked, worn)]
     assert [gains is not None and gains.unknown_loads for gains in said] == [
         ("effects.joint_load",),
         (),

@@ -121,7 +121,7 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
     scenario, motion, law = worn.scenario, walk_of(worn.scenario), law_of(worn.scenario)
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
     ended = f"{scenario.name}: {worn.status.kind}, {strides} of {motion.gait.name}"
-    verdict, gains = verdict_of(worn), gains_of(scenario, law)
+    verdict, gains = verdict_of(worn), gains_of(scenario)
     cut_off = (walked for walked in (worn, comparison.without_device) if not walked.status.is_completed)
     said = [ended, *(f"{walked.scenario.name}: {walked.status.message}" for walked in cut_off)]
     said += [benefit_sentence(comparison), verdict.sentence, limited_request(scenario)]
@@ -388,7 +388,7 @@ def _walk_data(comparison: WalkComparison, verdict: Tracking) -> dict[str, Any]:
         },
         "shown": dict(scenario.device.shown),
         "tracking": {**plain(verdict), "sentence": verdict.sentence},
-        "gains": plain(gains_of(scenario, law_of(scenario))),
+        "gains": plain(gains_of(scenario)),
         "minutes": float(worn.recording.time[-1]) / 60.0,
         **of_supply,
         "healthy": plain(dict(comparison.healthy)),
