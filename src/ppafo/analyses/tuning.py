@@ -400,12 +400,8 @@ def solve_tuning(
     problem: Problem, threads: int | None, progress: Report | None, executor: Executor | None = None
 ) -> ask.Finding[Tuned]:
     """Solve a tuning problem: search for gains, and evaluation of the gains before and after."""
-    scenario, effort, uncertainty, report = (
-        problem.scenario,
-        problem.effort,
-        problem.uncertainty,
-        progress or report_nothing,
-    )
+    scenario, effort, uncertainty = problem.scenario, problem.effort, problem.uncertainty
+    report = progress or report_nothing
     # As many as are made if no start converges early: the first candidates are a generation of their own, the gains
     # before run for the scales and for their result, the gains found once, and both over fresh draws.
     of_start = len(problem.searched) * (effort.candidates_per_gain * (effort.generations + 1) + _REFINEMENTS)
