@@ -335,7 +335,17 @@ def read_profile(table: ProfileSection, folder: Path, where: str) -> RequiredTor
         if time[0] != 0.0 or np.any(np.diff(time) <= 0.0):
             raise StudyError(f"{where}.time: must start at '0 s' and increase strictly")
     elif source.startswith(_GAIT):
-        time, torque, kind = *torque_of_gait(source, folder, where), "gait"
+        place, (name, *settings) = f"{where}: '{source}'", source.removeprefix(_GAIT).split(",")
+        given = {key.strip(): value.strip() for key, _, value in (setting.partition("=") for setting in settings)}
+        if len(given) < len(settings):
+            raise StudyError(f"{place}: give mass and share once")
+        wearer = checked_record(GaitShare, given, place, StudyError)
+        with refused_as(StudyError, place, DataError):
+            gait = load_gait(beside(name.strip(), folder))
+            if gait.ankle_moment is None:
+                raise DataError("this gait has no ankle_moment")
+        phases, kind = np.linspace(0.0, 1.0, _STRIDE_SAMPLES), "gait"
+        time, torque = gait.stride_time * phases, wearer.share * wearer.mass * gait.ankle_moment.values_at(phases)
     else:
         with refused_as(StudyError, f"{where}.recording", DataError):
             recording = read_recording(folder / source)
@@ -353,22 +363,6 @@ def read_profile(table: ProfileSection, folder: Path, where: str) -> RequiredTor
     if torque[-1] != torque[0]:
         samples = np.append(time[:-1], time[-1] - min(_MOMENT, 0.5 * (time[-1] - time[-2]))), torque
     return RequiredTorque(time, torque, kind, *choose_knots(*samples))
-
-
-def torque_of_gait(text: str, folder: Path, where: str) -> tuple[Floats, Floats]:
-    """Return times [s] and torques [N m] over a stride, of the share of a wearer's ankle moment in ``FROM_GAIT``."""
-    place = f"{where}: '{text}'"
-    name, *settings = (part.strip() for part in text.removeprefix(_GAIT).split(","))
-    given = {key.strip(): value.strip() for key, _, value in (setting.partition("=") for setting in settings)}
-    if len(given) < len(settings):
-        raise StudyError(f"{place}: give mass and share once")
-    wearer = checked_record(GaitShare, given, place, StudyError)
-    with refused_as(StudyError, place, DataError):
-        gait = load_gait(beside(name, folder))
-        if gait.ankle_moment is None:
-            raise DataError("this gait has no ankle_moment")
-    phases = np.linspace(0.0, 1.0, _STRIDE_SAMPLES)
-    return gait.stride_time * phases, wearer.share * wearer.mass * gait.ankle_moment.values_at(phases)
 
 
 def choose_knots(time: Floats, torque: Floats) -> tuple[Floats, Floats]:

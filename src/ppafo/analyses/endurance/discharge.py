@@ -380,17 +380,13 @@ def gas_of_walk(walk: WalkResult | Path) -> tuple[Scenario, Recording, float]:
 
 
 def on_walk(
-    scenario: Scenario,
-    recording: Recording,
-    gas: float,
-    bottle: str | Path | None,
-    schedule: Schedule,
-    overrides: Sequence[str],
+    walk: WalkResult | Path, bottle: str | Path | None, schedule: Schedule, overrides: Sequence[str]
 ) -> Endurance:
-    """Return the duration of a bottle for a walk that continues, from its gas per assisted stride [kg].
+    """Return the duration of a bottle for a walk, or its folder, that continues.
 
     Raises DataError if the walk took no gas, ScenarioError if it cannot be combined with the bottle.
     """
+    scenario, recording, gas = gas_of_walk(walk)
     if gas <= 0.0:
         raise DataError(f"walk '{scenario.name}': takes no gas, so no bottle would become empty; give one with help")
     if bottle is None and walk_of(scenario).bottle is None:
@@ -518,18 +514,44 @@ def finding_of(results: dict[str, Endurance]) -> Finding[Any]:
         counted, time = ("stride", "walking") if are_strides else ("repetition", "run time")
         longest = duration_kind(max(use.walking_time for use in results.values()))
         titles = ("gas use", (f"gas per {counted}", gas), (time, longest), f"{counted}s", "ended")
-        rows = [
+        cells = [
             (name, use.mass_per_stride, use.walking_time, strides_text(use.strides), use.ending)
             for name, use in results.items()
         ]
-        parts = [Section(columns=columns_of(titles, rows))]
+        parts = [Section(columns=columns_of(titles, cells))]
     else:
+        flow, pressure = (Kind(quantity=name, form=".3g").text for name in ("mass flow", "pressure"))
+        # Heat that warms the gas of the full bottle to the room's temperature behind the regulator.
+        content = bottle_content(full.fluid.table, full.mass, full.volume, full.room_temperature)
+        heat = heat_to_warm(full.fluid.table, content, full.room_temperature, full.regulator.set_pressure)
+        of_device = ", the supply pressure of the device" * (full.entries[SET_PRESSURE].origin == "derived")
+        walked = f"{duration_text(first.walking_time)} of {'use' if counted == 'repetition' else 'walking'}"
+        flows = f"{flow(first.mean_flow)}, largest {flow(first.peak_flow)}"
+        when_warm = f"{strides_text(first.strides_when_warm)} (a bottle that stays at room temperature)"
+        recording = first.recording
+        coldest = Kind(quantity="temperature", form=".1f").text(float(np.min(recording["bottle_temperature"])))
+        rows = [
+            ("run time", f"{walked}, {duration_text(first.total_time)} in total"),
+            ("strides" if counted == "stride" else "repetitions of the recording", strides_text(first.strides)),
+            (f"{counted}s without cooling", when_warm),
+            ("regulator set to", pressure(full.regulator.set_pressure) + of_device),
+            ("ended", first.message),
+            ("gas", f"{gas.text(first.mass_per_stride)} a {counted}, {flows}"),
+            ("heat that it lacks", f"{heat * first.mean_flow:.3g} W, {heat / 1000.0:.3g} kJ/kg, at the start"),
+            ("lowest temperature of the fluid", coldest),
+            ("pressure at the end", pressure(float(recording["bottle_pressure"][-1]))),
+        ]
+        if "liquid_mass" in recording:
+            dry = np.flatnonzero(recording["liquid_mass"] <= 0.0)
+            remaining = f"no, {gas.text(float(recording['liquid_mass'][-1]))} left"
+            used_up = f"after {duration_text(float(recording.time[dry[0]]))}" if dry.size else remaining
+            rows.append(("liquid used up", used_up))
         values = [
             (path, format_quantity(entry.value, entry.unit), entry.origin, entry.source)
             for path, entry in full.entries.items()
         ]
         parts = [
-            Section(columns=facts(_facts(first))),
+            Section(columns=facts(rows)),
             Section(
                 "The bottle over time",
                 panels=partial(_panels, first),
@@ -558,38 +580,6 @@ def finding_of(results: dict[str, Endurance]) -> Finding[Any]:
         found=results if several else first,
         files={} if several else {"bottle.csv": partial(marked_csv_bytes, first.recording)},
     )
-
-
-def _facts(endurance: Endurance) -> list[tuple[str, str]]:
-    """Return the most important results of a discharge as pairs of name and value."""
-    mass, flow, pressure = (Kind(quantity=name, form=".3g").text for name in ("gas mass", "mass flow", "pressure"))
-    recording, full, counted = endurance.recording, endurance.bottle, endurance.counted
-    # Heat that warms the gas of the full bottle to the room's temperature behind the regulator.
-    content = bottle_content(full.fluid.table, full.mass, full.volume, full.room_temperature)
-    heat = heat_to_warm(full.fluid.table, content, full.room_temperature, full.regulator.set_pressure)
-    of_device = ", the supply pressure of the device" * (full.entries[SET_PRESSURE].origin == "derived")
-    walked = f"{duration_text(endurance.walking_time)} of {'use' if counted == 'repetition' else 'walking'}"
-    flows = f"{flow(endurance.mean_flow)}, largest {flow(endurance.peak_flow)}"
-    when_warm = f"{strides_text(endurance.strides_when_warm)} (a bottle that stays at room temperature)"
-    coldest = Kind(quantity="temperature", form=".1f").text(float(np.min(recording["bottle_temperature"])))
-    rows = [
-        ("run time", f"{walked}, {duration_text(endurance.total_time)} in total"),
-        ("strides" if counted == "stride" else "repetitions of the recording", strides_text(endurance.strides)),
-        (f"{counted}s without cooling", when_warm),
-        ("regulator set to", pressure(full.regulator.set_pressure) + of_device),
-        ("ended", endurance.message),
-        ("gas", f"{mass(endurance.mass_per_stride)} a {counted}, {flows}"),
-        ("heat that it lacks", f"{heat * endurance.mean_flow:.3g} W, {heat / 1000.0:.3g} kJ/kg, at the start"),
-        ("lowest temperature of the fluid", coldest),
-        ("pressure at the end", pressure(float(recording["bottle_pressure"][-1]))),
-    ]
-    if "liquid_mass" in recording:
-        dry = np.flatnonzero(recording["liquid_mass"] <= 0.0)
-        remaining = f"no, {mass(float(recording['liquid_mass'][-1]))} left"
-        rows.append(
-            ("liquid used up", f"after {duration_text(float(recording.time[dry[0]]))}" if dry.size else remaining)
-        )
-    return rows
 
 
 def _panels(endurance: Endurance) -> list[Panel]:

@@ -78,7 +78,6 @@ def bottle(
         WALK_FILE,
         discharge,
         finding_of,
-        gas_of_walk,
         of_recording,
         on_walk,
         schedule_of,
@@ -116,15 +115,15 @@ def bottle(
     for number, use in enumerate(uses):
         if any(use is other or (isinstance(use, str | Path) and str(use) == str(other)) for other in uses[:number]):
             raise ParameterError("the same recording is given twice; give each recording only once")
-        if isinstance(use, WalkResult) or (not isinstance(use, Recording) and (Path(use) / WALK_FILE).is_file()):
-            walked = gas_of_walk(use if isinstance(use, WalkResult) else Path(use))
-            name = walked[0].name if isinstance(use, WalkResult) else str(use)
-            if stride_time is not None:
-                raise ParameterError(f"{argument_text('stride_time')}: {name} repeats one stride of its walk; omit it")
-            found = on_walk(*walked, bottle, schedule, changes)
-        else:
-            name = use.label if isinstance(use, Recording) else str(use)
+        name = (
+            use.scenario.name if isinstance(use, WalkResult) else use.label if isinstance(use, Recording) else str(use)
+        )
+        if isinstance(use, Recording) or not (isinstance(use, WalkResult) or (Path(use) / WALK_FILE).is_file()):
             found = of_recording(use, stride_time, chosen, schedule, changes)
+        elif stride_time is not None:
+            raise ParameterError(f"{argument_text('stride_time')}: {name} repeats one stride of its walk; omit it")
+        else:
+            found = on_walk(use if isinstance(use, WalkResult) else Path(use), bottle, schedule, changes)
         # Walks of one scenario with other overrides have one name.
         alike = sum(other == name or other.startswith(f"{name} (") for other in results)
         results[f"{name} ({alike + 1})" if alike else name] = found

@@ -86,6 +86,17 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
         titles: list[str | tuple[str, Kind]] = ["", *((name, Kind(form=".5g")) for name in columns)]
         cells = [(name, *row) for name, row in zip(rows, values.tolist(), strict=True)]
         matrices.append(Section(f"Matrix {name} (SI)", columns_of(titles, cells)))
+    point = []
+    outputs = tuple(name for name in model.outputs if name not in model.states)
+    for role, names in (("state", model.states), ("input", model.inputs), ("output", outputs)):
+        for name in names:
+            unit = UNITS[name]
+            kind = Kind("", "" if unit == "1" else unit, quantity_of_unit(unit), ".5g")
+            point.append((role, name, unit, kind.text(model.values[name])))
+    # Runs can start there: gas alone is in motion, and the largest step stays below full opening.
+    has_gas_alone = all(name.startswith("pressure") for name in model.states)
+    is_small = 0.0 < abs(model.values["command"]) < _LARGEST_COMMAND
+    can_step = model.time is None and model.scenario.motion.locked_angle is not None and has_gas_alone and is_small
     validity = Section(
         "Range of validity",
         panels=partial(steps_panels, model),
@@ -101,28 +112,16 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
         title=title,
         said=sentences,
         parts=[
-            _point(model),
+            Section("The point", columns_of(("", "name", "unit in the model", "at the point"), point), left=3),
             Section("Side of the kink", facts(model.sides.items()), remarks=kinks),
             _poles(model, title),
             _loop(model),
             *matrices,
-            *([validity] if can_step(model) else []),
+            *([validity] if can_step else []),
         ],
         found=model,
         overrides=changes_in(model.scenario),
     )
-
-
-def _point(model: LinearModel) -> Section:
-    """Return the table of states, inputs and outputs at the operating point; states are not repeated as outputs."""
-    outputs = [name for name in model.outputs if name not in model.states]
-    rows = []
-    for role, names in (("state", model.states), ("input", model.inputs), ("output", outputs)):
-        for name in names:
-            unit = UNITS[name]
-            kind = Kind("", "" if unit == "1" else unit, quantity_of_unit(unit), ".5g")
-            rows.append((role, name, unit, kind.text(model.values[name])))
-    return Section("The point", columns_of(("", "name", "unit in the model", "at the point"), rows), left=3)
 
 
 def _poles(model: LinearModel, title: str) -> Section:
@@ -247,20 +246,10 @@ def frequency_panels(model: LinearModel) -> list[Panel]:
 # Range of validity: steps of the command from the steady state, on the runs and of the model.
 
 
-def can_step(model: LinearModel) -> bool:
-    """True if runs can start at the operating point: steady gas states, locked ankle, valve state equal to the command.
-
-    The command must also stay below full opening for the largest step, 0.3 times the steady command.
-    """
-    is_locked = model.scenario.motion.locked_angle is not None
-    has_gas_alone = all(name.startswith("pressure") for name in model.states)
-    return model.time is None and is_locked and has_gas_alone and 0.0 < abs(model.values["command"]) < _LARGEST_COMMAND
-
-
 def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> tuple[Floats, Floats, Floats]:
     """Return step heights of the command [-] (steps,), and torque changes of runs and model [N m] (steps, times).
 
-    The steps are fractions of the steady command; the model must satisfy ``can_step``.
+    The steps are fractions of the steady command; the ankle must be locked, and gas pressures the only states.
     """
     from scipy.signal import StateSpace, step
 
