@@ -76,7 +76,8 @@ LARGEST_COEFFICIENT = 1.0
 """Largest possible discharge coefficient [-], of a jet as wide as its opening: above it the area or a unit is wrong."""
 _GRAMS_PER_BAR = 1.0e8
 """Conversion factor from kg/(s Pa) to g/s per bar."""
-_SIZE = FitNumber("size")
+_SIZE, _GAP = FitNumber("size"), FitNumber("gap")
+"""Sizes of an opening that is not reported."""
 Law = Literal["orifice", "iso6358", "laminar", "both"]
 
 VALVE = "name of a valve of the set; default: the chosen one"
@@ -271,7 +272,7 @@ class Opening:
     size: FitNumber = _SIZE
     known: float = 1.0
     critical_ratio: float | None = None
-    gap: FitNumber = _SIZE
+    gap: FitNumber = _GAP
 
     @property
     def has_sought_ratio(self) -> bool:
