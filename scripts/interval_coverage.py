@@ -31,8 +31,6 @@ from ppafo.identification.trajectory.experiment import (
     FittedExperiment,
     TrajectoryProblem,
     number_at,
-    numbers_of,
-    stated_by,
     tolerance_parameters,
 )
 from ppafo.identification.trajectory.fitting import TrajectoryFit, fit, numbers_in, prepare, signals_of
@@ -157,7 +155,7 @@ def problem_of(recordings: Sequence[Recording], random: np.random.Generator, sta
         FitNumber(path, start=value * math.exp(random.uniform(-0.3, 0.3)), low=value / 10.0, high=value * 10.0)
         for path, value in SOUGHT.items()
     )
-    stated = stated_by(load_parameter_set("ppafo2011"), experiments[0].scenario) if states else {}
+    stated = load_parameter_set("ppafo2011") if states else None
     return TrajectoryProblem((*sought, *tolerance_parameters(Tolerances(), experiments, sought, stated)), experiments)
 
 
@@ -173,7 +171,7 @@ def of_model(kind: str, random: np.random.Generator, supply_error: float = 0.0) 
     """
     clean = [noisy(simulate(one).recording, "white", random) for one in scenarios(truth_in_words())]
     problem = problem_of(clean, random)
-    numbers = numbers_of(problem)
+    numbers = problem.numbers
     truth = np.array([item.start for item in numbers])
     for place, item in enumerate(numbers):
         if item.path.startswith("supply.") and supply_error:

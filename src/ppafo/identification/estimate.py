@@ -49,6 +49,12 @@ def in_shown_unit(number: float, unit: str, stated: str = "") -> tuple[float, st
     return shown_value(float(number), si_unit, shown), shown.removesuffix("_d")
 
 
+def shown_text(number: float, unit: str, stated: str = "", digits: int = 6) -> str:
+    """Return a number with its unit as text, to ``digits`` significant digits, in the unit of ``in_shown_unit``."""
+    shown, name = in_shown_unit(number, unit, stated)
+    return f"{shown:.{digits}g} {name}".rstrip(" -")
+
+
 def digits_of(number: float, error: float) -> str:
     """Return a number rounded to two significant digits of an error, ``9.77`` for 9.7701 and an error of 0.22.
 

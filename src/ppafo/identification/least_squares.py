@@ -6,7 +6,7 @@ squares over all other variables is larger by t^2, with Student's factor t (prof
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -52,10 +52,6 @@ _CLOSE = 0.01
 """Relative distance of the profile from its wanted value [-] from which a limit is extrapolated."""
 _AWAY = 0.1
 """Least distance of a trial limit from both ends of its bracket, as a fraction of the bracket [-]."""
-_SHOWN_WEIGHT = 0.1
-"""Least weight of a variable in a combination [-] for which it is listed."""
-_UNDETERMINED = 0.5
-"""Standard error of a combination of relative variables [-] above which it is not identifiable."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +114,8 @@ class FitRuns:
 
     ``start`` is also the mean of the priors, ``prior`` the reciprocal of their standard deviations, 0 for an unknown;
     both are scaled. ``steps`` are the lengths of finite differences [-], which ``adapt_steps`` changes.
-    ``base @ point`` has the scaled values over which variables with a base are counted, 0 for the others.
+    ``base @ point`` has the scaled values over which variables with a base are counted, 0 for the others. ``channels``
+    are the blocks by channel.
     """
 
     def __init__(
@@ -139,7 +136,7 @@ class FitRuns:
         )
         self.prior = 1.0 / deviation
         self.base = np.array([[float(other.name == number.base) for other in numbers] for number in numbers])
-        self.channels = tuple(dict.fromkeys(block.channel for block in blocks))
+        self.channels = {block.channel: [each for each in blocks if each.channel == block.channel] for block in blocks}
         self.steps = np.full(len(numbers), _LONGEST_STEP)
         self.evaluations = 0
         self._last: tuple[bytes, Floats] | None = None
@@ -187,25 +184,12 @@ class FitRuns:
         sizes = np.linalg.norm(slopes * weight[:, None], axis=0)
         self.steps = np.clip(_UNITS_OF_NOISE / np.maximum(sizes, 1.0e-300), _SHORTEST_STEP, _LONGEST_STEP)
 
-    def rows_of(self, channel: str) -> list[slice]:
-        """Return the rows of a channel, one slice for each recording."""
-        return [block.rows for block in self.blocks if block.channel == channel]
-
-    def shared(self) -> Floats:
-        """Return the errors [SI] common to the rows of a recording, shape (rows, recordings with such errors)."""
-        names = list(dict.fromkeys(block.recording for block in self.blocks if block.shared is not None))
-        columns = np.zeros((self.blocks[-1].rows.stop, len(names)))
-        for block in self.blocks:
-            if block.shared is not None:
-                columns[block.rows, names.index(block.recording)] = block.shared
-        return columns
-
     @cached_property
     def _least_noise(self) -> dict[str, float]:
         """Noise floor by channel [SI], proportional to the channel's largest residual at the start."""
         start = self.residuals_at(self.start)
-        largest = {name: max(float(np.abs(start[rows]).max()) for rows in self.rows_of(name)) for name in self.channels}
-        return {name: _LEAST_NOISE * (size or 1.0) for name, size in largest.items()}
+        largest = (max(float(np.abs(start[block.rows]).max()) for block in blocks) for blocks in self.channels.values())
+        return {name: _LEAST_NOISE * (size or 1.0) for name, size in zip(self.channels, largest, strict=True)}
 
     def deviations(self, series: Floats) -> tuple[Floats, dict[str, float]]:
         """Return the noise [SI] by row and by channel, pooled over recordings and not below the floor.
@@ -213,10 +197,9 @@ class FitRuns:
         ``series`` has the residuals as first column; further columns are the uncertainty of the fitted model.
         """
         noise, by_channel = np.empty(len(series)), {}
-        for channel, least in self._least_noise.items():
-            samples = np.concatenate([series[rows] for rows in self.rows_of(channel)])
-            pooled = max(math.sqrt(float(np.square(samples).sum()) / len(samples)), least)
-            blocks = [block for block in self.blocks if block.channel == channel]
+        for channel, blocks in self.channels.items():
+            samples = np.concatenate([series[block.rows] for block in blocks])
+            pooled = max(math.sqrt(float(np.square(samples).sum()) / len(samples)), self._least_noise[channel])
             by_channel[channel] = max(pooled, float(np.min(blocks[0].floor)))
             for block in blocks:
                 noise[block.rows] = np.maximum(pooled, block.floor)
@@ -224,7 +207,7 @@ class FitRuns:
 
 
 class Linear(NamedTuple):
-    """Linearised least-squares problem.
+    """Linearised least-squares problem of some runs.
 
     ``rows``: whitened residuals and Jacobian [-], side by side. ``shared``: columns [-] for correlated errors, common
     to the samples of a recording or covering the samples left out; after subtraction of ``shared @ (shared.T @ x)`` the
@@ -232,11 +215,28 @@ class Linear(NamedTuple):
     row [SI]. ``sensors``: noise model by channel.
     """
 
+    runs: FitRuns
     rows: Floats
     shared: Floats
     root: Floats
     noise: Floats
     sensors: dict[str, Noise]
+
+    def errors(self, residuals: Floats) -> Floats:
+        """Return residuals [SI] (rows, points) as independent errors [-]."""
+        scaled = residuals / self.noise[:, None]
+        models = {channel: replace(noise, deviation=1.0) for channel, noise in self.sensors.items()}
+        errors = np.concatenate([whiten(scaled[block.rows], models[block.channel]) for block in self.runs.blocks])
+        return np.asarray(errors - self.shared @ (self.shared.T @ errors))
+
+    def squares(self, errors: Floats, points: Floats) -> Floats:
+        """Return the sum of squares [-] of independent errors (rows, points) and priors, for each scaled point."""
+        away = (points - self.runs.start[:, None]) * self.runs.prior[:, None]
+        return np.asarray(np.square(errors).sum(axis=0) + np.square(away).sum(axis=0))
+
+    def cost(self, residuals: Floats, point: Floats) -> float:
+        """Return the sum of squares [-] of priors and whitened residuals, given residuals [SI] (rows,) at a point."""
+        return float(self.squares(self.errors(residuals[:, None]), point[:, None])[0])
 
 
 def linear_at(
@@ -253,20 +253,24 @@ def linear_at(
     # A sample with a number of its own, of no known size, says nothing: so it is left out of any noise.
     own_numbers = np.zeros((len(residuals), len(left_out)))
     own_numbers[left_out, np.arange(len(left_out))] = _OF_ANY_SIZE
-    common = runs.shared()
+    # Errors [SI] that the rows of a recording share, one column for each recording that has them.
+    having = [block for block in runs.blocks if block.shared is not None]
+    names = list(dict.fromkeys(block.recording for block in having))
+    common = np.zeros((len(residuals), len(names)))
+    for part in having:
+        common[part.rows, names.index(part.recording)] = part.shared
     for _ in range(_ROUNDS):
         series = np.column_stack([residuals + slopes @ step, hidden])
         series[left_out] = 0.0
         noise, sizes = runs.deviations(series)
         sensors, scaled = {}, np.column_stack([residuals, slopes, common]) / noise[:, None]
         rows = np.column_stack([scaled, own_numbers])
-        for channel in runs.channels:
-            blocks = runs.rows_of(channel)
-            own = [series[block] / noise[block, None] for block in blocks]
+        for channel, blocks in runs.channels.items():
+            own = [series[block.rows] / noise[block.rows, None] for block in blocks]
             model = noise_of(own, runs.memory, runs.is_motion, like.get(channel))
             sensors[channel] = replace(model, deviation=sizes[channel])
             for block in blocks:
-                rows[block] = whiten(rows[block], model)
+                rows[block.rows] = whiten(rows[block.rows], model)
         # With D = U S V' the covariance is 1 + D D', and 1 - U (1 - 1 / sqrt(1 + S^2)) U' makes it 1.
         axes, triangle = np.linalg.qr(rows[:, 1 + len(point) :])
         turned, spread, _ = np.linalg.svd(triangle)
@@ -285,7 +289,7 @@ def linear_at(
         step = np.asarray(solved.x)
         if np.abs(np.linalg.pinv(root) @ (step - before)).max() < _STILL and series.shape[1] > 1:
             break
-    return Linear(rows=rows, shared=shared, root=root, noise=noise, sensors=sensors), step
+    return Linear(runs, rows, shared, root, noise, sensors), step
 
 
 def root_of_inverse(curvature: Floats) -> tuple[Floats, Flags]:
@@ -299,34 +303,8 @@ def root_of_inverse(curvature: Floats) -> tuple[Floats, Flags]:
     return np.asarray(vectors / np.sqrt(np.maximum(values, _RANK)) / size[:, None]), np.asarray(values > _RANK)
 
 
-def whitened_errors(runs: FitRuns, residuals: Floats, linear: Linear) -> Floats:
-    """Return residuals [SI] (rows, points) as independent errors [-], using the noise of a linearised problem."""
-    scaled = residuals / linear.noise[:, None]
-    models = {channel: replace(noise, deviation=1.0) for channel, noise in linear.sensors.items()}
-    errors = np.concatenate([whiten(scaled[block.rows], models[block.channel]) for block in runs.blocks])
-    return np.asarray(errors - linear.shared @ (linear.shared.T @ errors))
-
-
-def squares_of(runs: FitRuns, errors: Floats, points: Floats) -> Floats:
-    """Return the sum of squares [-] of whitened errors (rows, points) and priors, for each scaled point."""
-    away = (points - runs.start[:, None]) * runs.prior[:, None]
-    return np.asarray(np.square(errors).sum(axis=0) + np.square(away).sum(axis=0))
-
-
-def cost_of(runs: FitRuns, residuals: Floats, point: Floats, linear: Linear) -> float:
-    """Return the sum of squares [-] of priors and whitened residuals, given residuals [SI] (rows,) at a point."""
-    return float(squares_of(runs, whitened_errors(runs, residuals[:, None], linear), point[:, None])[0])
-
-
-def fall_of(runs: FitRuns, point: Floats, linear: Linear, step: Floats) -> float:
-    """Return by how much the sum of squares [-] of a linearised problem falls along a step from its scaled point."""
-    errors = np.column_stack([linear.rows[:, 0], linear.rows[:, 0] + linear.rows[:, 1:] @ step])
-    before, after = squares_of(runs, errors, np.column_stack([point, point + step])).tolist()
-    return float(before - after)
-
-
 def best_along(
-    runs: FitRuns, point: Floats, residuals: Floats, step: Floats, slopes: Floats, linear: Linear
+    linear: Linear, point: Floats, residuals: Floats, step: Floats, slopes: Floats
 ) -> tuple[float, Floats, Floats]:
     """Return the least sum of squares [-] along a step from a scaled point, its point, and the residuals [SI] there.
 
@@ -334,9 +312,10 @@ def best_along(
     its fall along a curved valley. A variable without a step stays. ``slopes`` is the whitened Jacobian [-] at the
     point. The sum is infinite if no run succeeds, even after a ``SHORT`` fraction of the step.
     """
+    runs = linear.runs
     ends = np.clip(np.column_stack([point + SHORT * step, point - SHORT * step]).T, runs.low, runs.high).T
     ahead, behind = runs.residuals_at_points(ends).T
-    curvature = whitened_errors(runs, ((ahead - residuals) + (behind - residuals))[:, None] / SHORT**2, linear)[:, 0]
+    curvature = linear.errors(((ahead - residuals) + (behind - residuals))[:, None] / SHORT**2)[:, 0]
     bend = np.zeros(len(point))
     if np.isfinite(curvature).all():
         right_side = np.concatenate([curvature, bend])
@@ -345,91 +324,88 @@ def best_along(
     tried = np.clip(point + _SHARES * step + 0.5 * np.square(_SHARES) * bend, runs.low, runs.high).T
     points = np.column_stack([tried, ends[:, 0]])
     found = np.column_stack([runs.residuals_at_points(tried), ahead])
-    squares = squares_of(runs, whitened_errors(runs, found, linear), points)
+    squares = linear.squares(linear.errors(found), points)
     best = int(np.argmin(np.where(np.isfinite(squares), squares, np.inf)))
     return (float(squares[best]) if np.isfinite(squares[best]) else np.inf), points[:, best], found[:, best]
 
 
-def interval_ends(runs: FitRuns, point: Floats, linear: Linear, times: float) -> tuple[Floats, Floats]:
+def interval_ends(linear: Linear, point: Floats, times: float) -> tuple[Floats, Floats]:
     """Return scaled lower and upper confidence limits: ``times`` standard errors, or wider for nonlinear laws.
 
-    Only intervals of unknowns without a prior are widened. A limit that the samples do not determine is the bound.
+    Only intervals of unknowns without a prior are widened, by profile likelihood. The profile is the root of the
+    increase of the squares: by how many standard errors priors and samples tell a point from the estimate. It is
+    searched from the linear limit to the bound, which is the limit where the samples determine none.
     """
-    covariance = linear.root @ linear.root.T
+    runs, covariance = linear.runs, linear.root @ linear.root.T
     wide = times * np.sqrt(np.diag(covariance))
     low, high = np.maximum(point - wide, runs.low), np.minimum(point + wide, runs.high)
+    least = linear.cost(runs.residuals_at(point), point)
     for number in np.flatnonzero(runs.prior == 0.0).tolist():
         way = covariance[:, number] / covariance[number, number]
+        # At the bound of an excess the samples may say nothing of its size, which the straight line then overestimates.
+        is_least = not runs.base[number].any()
         for ends, bound in ((low, runs.low[number]), (high, runs.high[number])):
-            if ends[number] != point[number]:
-                straight = point + way * (ends[number] - point[number])
-                straight[number] = ends[number]
-                ends[number] = _end(runs, point, straight, linear, number, float(bound), times)
+            if ends[number] == point[number]:
+                continue
+            tried = point + way * (ends[number] - point[number])
+            tried[number] = ends[number]
+            # Points with their profiles: the two last ones below the wanted profile, and the last one above it.
+            before = inner = point, 0.0
+            outer: tuple[Floats, float] | None = None
+            for _ in range(_TRIES):
+                squares, reached = _least_along(linear, np.clip(tried, runs.low, runs.high), number)
+                profile = math.sqrt(max(squares - least, 0.0))
+                if profile >= times and inner[0] is point and is_least:
+                    end = reached[number]
+                    break
+                if abs(profile - times) <= _CLOSE * times:
+                    end = point[number] + times / profile * (reached[number] - point[number])
+                    end = min(max(end, runs.low[number]), runs.high[number])
+                    break
+                if profile >= times:
+                    outer = reached, profile
+                elif reached[number] == bound:
+                    end = bound
+                    break
+                else:
+                    before, inner = inner, (reached, profile)
+                other = before if outer is None else outer
+                rise, missing = abs(other[1] - inner[1]), times - inner[1]
+                # Between two points the secant stays away from both; beyond them its distance may double.
+                away = np.abs(np.array([inner[0][number] - point[number], other[0][number] - inner[0][number]]))
+                most = away[0] / away[1] if outer is None else 1.0 - _AWAY
+                share = min(missing / rise, most) if 0.0 < rise < math.inf else 0.5 * most
+                tried = inner[0] + (-share if outer is None else max(share, _AWAY)) * (other[0] - inner[0])
+            else:
+                end = bound if outer is None else tried[number]
+            ends[number] = end
     return low, high
 
 
-def _end(
-    runs: FitRuns, point: Floats, straight: Floats, linear: Linear, number: int, bound: float, times: float
-) -> float:
-    """Return one confidence limit of a variable by profile likelihood, searched from the linear limit to the bound.
-
-    ``straight`` is the point at the linear limit. The profile is the root of the increase of the squares: by how many
-    standard errors priors and samples tell a point from the estimate.
-    """
-    least = cost_of(runs, runs.residuals_at(point), point, linear)
-    # Points with their profiles: the two last ones below the wanted profile, and the last one above it.
-    before = inner = point, 0.0
-    outer: tuple[Floats, float] | None = None
-    tried = straight
-    # At the bound of an excess the samples may say nothing of its size, which the straight line then overestimates.
-    is_least = not runs.base[number].any()
-    for _ in range(_TRIES):
-        squares, reached = _least_along(runs, np.clip(tried, runs.low, runs.high), number, linear)
-        profile = math.sqrt(max(squares - least, 0.0))
-        if profile >= times and inner[0] is point and is_least:
-            return float(reached[number])
-        if abs(profile - times) <= _CLOSE * times:
-            end = point[number] + times / profile * (reached[number] - point[number])
-            return float(min(max(end, runs.low[number]), runs.high[number]))
-        if profile >= times:
-            outer = reached, profile
-        elif float(reached[number]) == bound:
-            return bound
-        else:
-            before, inner = inner, (reached, profile)
-        other = before if outer is None else outer
-        rise, missing = abs(other[1] - inner[1]), times - inner[1]
-        # Between two points the secant stays away from both; beyond them its distance from the estimate may double.
-        away = np.abs(np.array([inner[0][number] - point[number], other[0][number] - inner[0][number]]))
-        most = away[0] / away[1] if outer is None else 1.0 - _AWAY
-        share = min(missing / rise, most) if 0.0 < rise < math.inf else 0.5 * most
-        tried = inner[0] + (-share if outer is None else max(share, _AWAY)) * (other[0] - inner[0])
-    return bound if outer is None else float(tried[number])
-
-
-def _least_along(runs: FitRuns, point: Floats, number: int, linear: Linear) -> tuple[float, Floats]:
+def _least_along(linear: Linear, point: Floats, number: int) -> tuple[float, Floats]:
     """Return the least sum of squares [-] with one variable of a scaled point fixed, and the point that reaches it.
 
     The other variables take Gauss-Newton steps within their bounds, each with its own Jacobian, because far from the
     estimate its Jacobian leads out of a curved valley. The sum is infinite if no run succeeds.
     """
+    runs = linear.runs
     residuals = runs.residuals_at_points(point[:, None])[:, 0]
     if not np.isfinite(residuals).all():
         return math.inf, point
-    squares = cost_of(runs, residuals, point, linear)
+    squares = linear.cost(residuals, point)
     others = np.delete(np.arange(len(point)), number)
     for _ in range(_STEPS):
         jacobian = runs.jacobian(point, is_central=False)
         runs.adapt_steps(jacobian, 1.0 / linear.noise)
-        slopes = whitened_errors(runs, jacobian, linear)
+        slopes = linear.errors(jacobian)
         slopes[:, number] = 0.0
-        errors = whitened_errors(runs, residuals[:, None], linear)[:, 0]
+        errors = linear.errors(residuals[:, None])[:, 0]
         axes, triangle = np.linalg.qr(np.concatenate([slopes, np.diag(runs.prior)])[:, others])
         pull = axes.T @ np.concatenate([errors, (point - runs.start) * runs.prior])
         low, high = (end - point[others] for end in (runs.low[others], runs.high[others]))
         step = np.zeros(len(point))
         step[others] = lsq_linear(triangle, -pull, (low - 1.0e-300, high + 1.0e-300), method="bvls").x
-        reached, tried, found = best_along(runs, point, residuals, step, slopes, linear)
+        reached, tried, found = best_along(linear, point, residuals, step, slopes)
         fall = squares - reached
         if not fall > 0.0:
             break
@@ -437,16 +413,3 @@ def _least_along(runs: FitRuns, point: Floats, number: int, linear: Linear) -> t
         if fall < _SETTLED:
             break
     return squares, point
-
-
-def unidentified(covariance: Floats, names: Sequence[str]) -> Iterator[dict[str, float]]:
-    """Yield combinations of variables whose standard error is above half their size, as weights by name.
-
-    ``covariance`` is relative to the size of each variable.
-    """
-    variances, vectors = np.linalg.eigh(covariance)
-    for variance, vector in zip(variances[::-1].tolist(), vectors.T[::-1], strict=True):
-        if math.sqrt(max(variance, 0.0)) > _UNDETERMINED:
-            largest = float(vector[np.argmax(np.abs(vector))])
-            weights = {name: float(weight) / largest for name, weight in zip(names, vector, strict=True)}
-            yield {name: weight for name, weight in weights.items() if abs(weight) >= _SHOWN_WEIGHT}

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from ppafo.errors import ParameterError, UnitError
-from ppafo.identification.estimate import Estimate, interval_factor
+from ppafo.identification.estimate import Estimate, in_shown_unit, interval_factor
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION
@@ -54,9 +54,41 @@ def with_estimates(parameter_set: ParameterSet, estimates: Iterable[Estimate], v
     for estimate in estimates:
         find_effects([estimate.path])
         quantity = parameter_set.declarations().get(estimate.path)
-        if quantity is not None and estimate.is_usable and is_within(estimate.value, quantity):
-            parameter_set = _with_estimate(parameter_set, estimate, quantity)
-            used[estimate.path] = estimate
+        if quantity is None or not (estimate.is_usable and is_within(estimate.value, quantity)):
+            continue
+        used[estimate.path] = estimate
+        # In the unit of the earlier entry.
+        before = parameter_set.numbers.get(estimate.path)
+        atmosphere = atmospheric_pressure(parameter_set)
+        unit = quantity.unit if before is None else before.unit
+        si_unit = fitting_unit(unit, quantity)
+        value, low, high = (
+            from_si(number, unit, si_unit, atmosphere) for number in (estimate.value, estimate.low, estimate.high)
+        )
+        previous = "no value" if before is None else f"{entry_text(before)} ({before.origin}: {before.source})"
+        said = f"{100.0 * estimate.confidence:g}% interval {low:.6g} to {high:.6g} {unit}".rstrip()
+        said = f"{estimate.verdict_text}, {said}; {estimate.explanation.rstrip('.')}"
+        # An interval that is cut at a bound is too narrow on that side.
+        wider = max(high - value, value - low)
+        half_width = wider * interval_factor(CONFIDENCE) / interval_factor(estimate.confidence)
+        entry = Entry(
+            value=_in_digits_of(value, half_width),
+            unit=unit,
+            origin="identified" if estimate.is_identified else "fitted",
+            source="; ".join(estimate.recordings),
+            note=f"{said}. Before, the set had {previous}.",
+            uncertainty=_in_digits_of(half_width, half_width),
+        )
+        # An orifice that is given as an area has no sonic conductance any more, and the other way round.
+        section, _, name = estimate.path.rpartition(".")
+        others = {f"{section}.{member}" for form, other in _FORMS if name in form for member in other}
+        numbers = {path: old for path, old in parameter_set.numbers.items() if path not in others}
+        # A pressure that was fitted for both regulators holds for both.
+        links = acting(links_of_set(parameter_set), {estimate.path})
+        numbers |= dict.fromkeys((estimate.path, *(path for path, link in links.items() if link.when)), entry)
+        note = f"as {estimate.path} was identified"
+        numbers |= {path: Entry(beside, "", "derived", entry.source, note) for path, beside in estimate.beside.items()}
+        parameter_set = replace(parameter_set, numbers=numbers)
     static, dynamic = (used.get(f"friction.{kind}_torque") for kind in ("static", "dynamic"))
     if static is not None and dynamic is not None and static.value >= dynamic.value:
         # Rounded to the digits of its interval, static friction may be below dynamic friction.
@@ -72,40 +104,6 @@ def with_estimates(parameter_set: ParameterSet, estimates: Iterable[Estimate], v
     written = tuple(path for path, estimate in used.items() if estimate.is_identified)
     fitted = tuple(path for path, estimate in used.items() if not estimate.is_identified)
     return NewSet(parameter_set, written, fitted, problem)
-
-
-def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Quantity) -> ParameterSet:
-    """Return the set with one value replaced, in the unit of the earlier entry."""
-    before = parameter_set.numbers.get(estimate.path)
-    atmosphere = atmospheric_pressure(parameter_set)
-    unit = quantity.unit if before is None else before.unit
-    si_unit = fitting_unit(unit, quantity)
-    value, low, high = (
-        from_si(number, unit, si_unit, atmosphere) for number in (estimate.value, estimate.low, estimate.high)
-    )
-    previous = "no value" if before is None else f"{entry_text(before)} ({before.origin}: {before.source})"
-    said = f"{estimate.verdict_text}, {100.0 * estimate.confidence:g}% interval {low:.6g} to {high:.6g} {unit}".rstrip()
-    # An interval that is cut at a bound is too narrow on that side.
-    wider = max(high - value, value - low)
-    half_width = wider * interval_factor(CONFIDENCE) / interval_factor(estimate.confidence)
-    entry = Entry(
-        value=_in_digits_of(value, half_width),
-        unit=unit,
-        origin="identified" if estimate.is_identified else "fitted",
-        source="; ".join(estimate.recordings),
-        note=f"{said}; {estimate.explanation.rstrip('.')}. Before, the set had {previous}.",
-        uncertainty=_in_digits_of(half_width, half_width),
-    )
-    # An orifice that is given as an area has no sonic conductance any more, and the other way round.
-    section, _, name = estimate.path.rpartition(".")
-    others = {f"{section}.{member}" for form, other in _FORMS if name in form for member in other}
-    numbers = {path: old for path, old in parameter_set.numbers.items() if path not in others}
-    # A pressure that was fitted for both regulators holds for both.
-    links = acting(links_of_set(parameter_set), {estimate.path})
-    numbers |= dict.fromkeys((estimate.path, *(path for path, link in links.items() if link.when)), entry)
-    note = f"as {estimate.path} was identified"
-    numbers |= {path: Entry(beside, "", "derived", entry.source, note) for path, beside in estimate.beside.items()}
-    return replace(parameter_set, numbers=numbers)
 
 
 def _in_digits_of(value: float, half_width: float) -> float:
@@ -134,9 +132,9 @@ def stated_half_width(entry: Entry, unit: str) -> float:
 
 
 def in_set_unit(number: float, path: str, si_unit: str, parameter_set: ParameterSet) -> tuple[float, str]:
-    """Return a value and its unit, converted to the unit of its entry in the set; unchanged [SI] without an entry."""
+    """Return a value [SI] and its unit for display: those of its entry in the set, or the display unit without one."""
     entry, quantity = parameter_set.numbers.get(path), parameter_set.declarations().get(path)
     if entry is None or quantity is None or entry.unit == si_unit:
-        return number, si_unit
+        return in_shown_unit(number, si_unit)
     si = fitting_unit(entry.unit, quantity)
     return from_si(number, entry.unit, si, atmospheric_pressure(parameter_set)), entry.unit

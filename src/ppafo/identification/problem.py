@@ -178,29 +178,23 @@ def parse_problem(content: bytes, file: str, folder: Path | None = None) -> Prob
     # Each may be left out, which the layout allows, but not both.
     if not problem.procedure and problem.trajectory is None:
         raise IdentificationError(f"{file}: has neither a [[procedure]] nor a [trajectory]")
-    experiments = () if problem.trajectory is None else problem.trajectory.experiments
-    named = [(f"procedure.{number}", item.columns) for number, item in enumerate(problem.procedure, start=1)]
-    named += [(f"trajectory.experiments.{number}", item.columns) for number, item in enumerate(experiments, start=1)]
-    faults = {
-        f"{table}.columns": f"{table}.columns = {quote(name)}: no such column map{known_names(name, problem.columns)}"
-        for table, name in named
-        if name is not None and name not in problem.columns
-    }
-    recordings = [
-        (f"procedure.{number}.recordings.{place}", name)
+    tables = [
+        (f"procedure.{number}", item.columns, {f"recordings.{at}": name for at, name in enumerate(item.recordings, 1)})
         for number, item in enumerate(problem.procedure, start=1)
-        for place, name in enumerate(item.recordings, start=1)
     ]
-    recordings += [
-        (f"trajectory.experiments.{number}.recording", item.recording)
-        for number, item in enumerate(experiments, start=1)
-    ]
-    if folder is not None:
-        for key, name in recordings:
-            if not (folder / name).is_file():
+    experiments = () if problem.trajectory is None else problem.trajectory.experiments
+    for number, experiment in enumerate(experiments, start=1):
+        tables.append((f"trajectory.experiments.{number}", experiment.columns, {"recording": experiment.recording}))
+    faults = {}
+    for table, columns, recordings in tables:
+        if columns is not None and columns not in problem.columns:
+            wrong = f"no such column map{known_names(columns, problem.columns)}"
+            faults[f"{table}.columns"] = f"{table}.columns = {quote(columns)}: {wrong}"
+        for key, name in recordings.items():
+            if folder is not None and not (folder / name).is_file():
                 wrong = "is a folder" if (folder / name).is_dir() else "no such file"
                 near = nearest_name(name, [each.name for each in folder.iterdir()])
-                faults[key] = f"{key} = {quote(name)}: {wrong}{near}"
+                faults[f"{table}.{key}"] = f"{table}.{key} = {quote(name)}: {wrong}{near}"
     if faults:
         refuse(faults, file, IdentificationError, partial(line_of, decoded(content)))
     return problem

@@ -6,9 +6,9 @@ must be known to be closed.
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import get_args
+from typing import NamedTuple, get_args
 
 from ppafo.errors import IdentificationError, PpafoError, noted_in, raise_noted
 from ppafo.identification.bench.flow import LARGEST_COEFFICIENT, FlowLaw, OpenValveFlowProblem
@@ -19,13 +19,15 @@ from ppafo.identification.bench.static_torque import FORCE, TORQUE, StaticTorque
 from ppafo.identification.bench.valve_map import ValveMapProblem
 from ppafo.identification.bench.vane_leak import SteadyLeakProblem, VaneLeakProblem
 from ppafo.identification.estimate import WRONG_UNIT
-from ppafo.identification.source import RecordingSource
+from ppafo.identification.source import RecordingReader, RecordingSource, UsedRecording, double_use
 from ppafo.parameters.parameter_set import atmospheric_pressure
-from ppafo.signals.recording import Recording
+from ppafo.signals.recording import TIME
 from ppafo.simulation.recorded.usual_errors import misread_units
 from ppafo.units import split_pressure_kind
 from ppafo.wording import percentage
 
+_ROW_TIME = 1.0
+"""Time between the rows of a table of steady readings without times [s]."""
 _NEAR = 1.5
 """Largest ratio [-] of a discharge coefficient in another unit to the value of the set, for the unit to be accused."""
 _IMPOSSIBLE, _OTHER_UNITS = 300.0, ("N m", "Pa_d")
@@ -76,7 +78,15 @@ def with_tried_units(
             channels[group[0]].unit.removesuffix("_d") if group else "", [channels[name].stated for name in group]
         )
     ):
-        again = [replace(source, recording=_in_unit(source.recording, names, factor, atmosphere)) for source in sources]
+        again = []
+        for source in sources:
+            recording = source.recording
+            for name in names:
+                # From the zero of the stated unit.
+                channel = recording.channels[name]
+                zero = atmosphere if split_pressure_kind(channel.stated)[1] == "g" else 0.0
+                recording = recording.with_channel(name, zero + (channel.values - zero) / factor, channel.unit)
+            again.append(replace(source, recording=recording))
         try:
             tried = run(tuple(again))
         except IdentificationError:
@@ -106,15 +116,6 @@ def with_tried_units(
     return found
 
 
-def _in_unit(recording: Recording, names: Iterable[str], factor: float, atmosphere: float) -> Recording:
-    """Return a recording with some absolute pressures divided by a factor, from the zero of their stated unit."""
-    for name in names:
-        channel = recording.channels[name]
-        zero = atmosphere if split_pressure_kind(channel.stated)[1] == "g" else 0.0
-        recording = recording.with_channel(name, zero + (channel.values - zero) / factor, channel.unit)
-    return recording
-
-
 BenchProblem = (
     StaticTorqueProblem
     | FreeDecayProblem
@@ -132,6 +133,52 @@ def check_needed_channels(where: str, problem: BenchProblem, read: Sequence[str]
     """Raise IdentificationError for channels that a law needs beside those ``read``; a force is a torque."""
     needed = [FORCE if name == TORQUE and FORCE in read and TORQUE not in read else name for name in problem.needed]
     check_channels(f"{where}: {problem.kind}", needed, read)
+
+
+class BenchTask(NamedTuple):
+    """Identification procedure with its recordings, and the name used in error messages."""
+
+    procedure: BenchProblem
+    sources: tuple[RecordingSource, ...]
+    label: str
+
+
+def read_tasks(
+    procedures: Sequence[BenchProblem], reader: RecordingReader
+) -> tuple[list[BenchTask], tuple[UsedRecording, ...]]:
+    """Read the recordings of procedures; return them in the recommended order, and the use of each recording.
+
+    A recording may serve two different procedures. Raises IdentificationError if a procedure uses a recording twice.
+    """
+    tasks, used = list[BenchTask](), list[UsedRecording]()
+    for number, procedure in enumerate(procedures, start=1):
+        kind, gas = procedure.kind, getattr(procedure, "gas", None)
+        row_time = _ROW_TIME if kind in procedure.steady else None
+        sources: list[RecordingSource] = []
+        for recording in procedure.recordings:
+            wrong = list[PpafoError]()
+            with noted_in(wrong):
+                sources += reader.read(recording, procedure.columns, row_time, gas)
+            if wrong and procedure.columns is not None:
+                # Missing channels of the map are said with what is wrong in it.
+                mapped = reader.columns[procedure.columns]
+                names = [name for name in mapped.channels if name != TIME]
+                with noted_in(wrong):
+                    check_needed_channels(recording, procedure, [*names, *(["direction"] if mapped.direction else [])])
+            raise_noted(wrong)
+        tasks.append(BenchTask(procedure, tuple(sources), f"{reader.file}: procedure {number}, {kind}"))
+    tasks.sort(key=lambda task: [*LAWS].index(task.procedure.kind))
+    for task in tasks:
+        kind = task.procedure.kind
+        # Steady readings have no times: each counts by itself.
+        first, last = (getattr(task.procedure, name, None) for name in ("start", "end"))
+        window = -math.inf if first is None else first, math.inf if last is None else last
+        for number, source in enumerate(task.sources, start=1):
+            name = f"recording {number} of procedure {kind}"
+            used.append(UsedRecording(name, source.trace, source.recording, frozenset(), *window, kind))
+    if used_twice := double_use(used):
+        raise IdentificationError(f"{reader.file}: {used_twice}")
+    return tasks, tuple(used)
 
 
 def run_procedure(sources: tuple[RecordingSource, ...], problem: BenchProblem, context: BenchContext) -> BenchResult:

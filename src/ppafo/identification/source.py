@@ -2,20 +2,26 @@
 
 import hashlib
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.estimate import in_shown_unit
+from ppafo.identification.estimate import shown_text
+from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, number_in_si
 from ppafo.signals import Recording, RecordingKind
 from ppafo.signals.faults import FEWEST_AT_LIMIT, is_at_limit, plateaus, scatters
-from ppafo.signals.recording import Floats
+from ppafo.signals.recording import TIME, Floats
+from ppafo.storage.column_map import ColumnMap, MappedChannel
+from ppafo.storage.comma_separated import read_csv
 from ppafo.storage.files import read_bytes
+from ppafo.storage.foreign import read_trials
+from ppafo.storage.reading import TEXT_SUFFIXES, read_recording
+from ppafo.storage.result_folder import RUN_FILE
 
 _NO_SENSORS = ("command", "direction", "repetition")
 """Channels without a sensor, hence without a sensor limit."""
@@ -56,8 +62,7 @@ class RecordingSource:
     def shown(self, name: str, value: float) -> str:
         """Return a channel value [SI] as text, in the unit of the file."""
         channel = self.recording.channels[name]
-        number, unit = in_shown_unit(value, channel.unit, channel.stated)
-        return f"{number:.6g} {unit}".removesuffix(" -")
+        return shown_text(value, channel.unit, channel.stated)
 
 
 Sources = tuple[RecordingSource, ...]
@@ -70,6 +75,43 @@ def source_of(path: Path, recording: Recording, trial: str = "") -> RecordingSou
     ``trial`` is appended to the name if the file has several recordings.
     """
     return RecordingSource(recording, f"{path.name}{trial} sha256:{hashlib.sha256(read_bytes(path)).hexdigest()}")
+
+
+class RecordingReader(NamedTuple):
+    """Reader of the recordings that a problem file names.
+
+    ``columns`` are its column maps by name, ``folder`` is the base of relative paths, ``file`` the name of the problem
+    in messages. ``parameter_set`` has the atmosphere of gauge pressures, and the gas of volume flows if none is given.
+    """
+
+    columns: Mapping[str, ColumnMap]
+    folder: Path
+    file: str
+    parameter_set: ParameterSet
+
+    def read(
+        self, name: str, columns: str | None, row_time: float | None = None, gas: str | None = None
+    ) -> tuple[RecordingSource, ...]:
+        """Return the recordings in a file, read through the column map ``columns`` if one is given.
+
+        ``row_time`` [s] is the time between the rows of a table of text, or of a column map, without a time column;
+        None requires the column. ``gas`` is the gas of volume flows.
+        """
+        path, atmosphere = self.folder / name, atmospheric_pressure(self.parameter_set)
+        if columns is None:
+            is_text = path.suffix.lower() in TEXT_SUFFIXES and not (path.parent / RUN_FILE).exists()
+            if row_time is not None and is_text:
+                return (source_of(path, read_csv(path, atmosphere=atmosphere, row_time=row_time)),)
+            return (source_of(path, read_recording(path, atmosphere=atmosphere)),)
+        molar_mass = number_in_si(self.parameter_set, "gas.molar_mass")
+        flowing = gas or ("" if molar_mass is None else f"{molar_mass!r} kg/mol")
+        column_map = self.columns[columns]
+        # A direction from a rate, and trials that begin anew, need the times of the bench.
+        if row_time is not None and not (TIME in column_map.channels or column_map.direction or column_map.trial):
+            time = MappedChannel(rate=f"{1.0 / row_time!r} Hz")
+            column_map = replace(column_map, channels={TIME: time, **column_map.channels})
+        recordings = read_trials(path, column_map, atmosphere, f"{self.file}:{columns}", flowing)
+        return tuple(source_of(path, recording, recording.label.removeprefix(path.stem)) for recording in recordings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,13 +130,6 @@ class UsedRecording:
     last: float = math.inf
     kind: str = ""
 
-    def overlaps(self, other: "UsedRecording") -> bool:
-        """Return whether two uses of the same recording share samples of a channel."""
-        if self.kind and other.kind and self.kind != other.kind:
-            return False
-        is_alike = not (self.channels and other.channels) or bool(self.channels & other.channels)
-        return is_alike and self.first < other.last and other.first < self.last
-
 
 def double_use(uses: Iterable[UsedRecording]) -> str:
     """Return a message on samples used twice; empty if none are.
@@ -103,7 +138,10 @@ def double_use(uses: Iterable[UsedRecording]) -> str:
     """
     digests = [(use, _digest(use.recording)) for use in uses]
     for (use, digest), (other, other_digest) in combinations(digests, 2):
-        if digest == other_digest and use.overlaps(other):
+        is_other_procedure = use.kind and other.kind and use.kind != other.kind
+        shares = not (use.channels and other.channels) or bool(use.channels & other.channels)
+        is_at_once = use.first < other.last and other.first < use.last
+        if digest == other_digest and not is_other_procedure and shares and is_at_once:
             return (
                 f"{use.by} ({use.trace}) and {other.by} ({other.trace}) are the same recording (SHA-256 "
                 f"{digest[:12]}), so its samples would count twice"

@@ -8,15 +8,12 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import IdentificationError, UnitError, refused_as
 from ppafo.identification.estimate import interval_factor
 from ppafo.model.declaration import Number, Quantity
 from ppafo.parameters.declared import Words
 from ppafo.parameters.parameter_set import CONFIDENCE
 from ppafo.parameters.records import keyed
 from ppafo.simulation.recorded.usual_errors import ANGLE_ERRORS, PRESSURE_ERRORS, SUPPLY_ERROR, deviation_of_limit
-from ppafo.units import parse_quantity
 
 Sensed = Literal["zero", "gain"]
 GAS_TEMPERATURE, GAS_LAW = 15.0, 0.01
@@ -158,12 +155,3 @@ class Tolerances:
 
 DEFAULTS = Tolerances()
 """Tolerances of a bench without a table [bench]."""
-
-
-def quantity_of(where: str, text: str, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-    """Parse a quantity of a problem file into a number in ``unit``; ``where`` is the file and key in messages.
-
-    Raises IdentificationError if the text does not fit the unit.
-    """
-    with refused_as(IdentificationError, f"{where} = '{text}'", UnitError):
-        return parse_quantity(text, unit, atmosphere)

@@ -18,7 +18,7 @@ from ppafo.identification.bench.vane_leak import VaneLeakProblem
 from ppafo.identification.estimate import UNKNOWN, Estimate, relative_half_width
 from ppafo.identification.new_set import with_estimates
 from ppafo.identification.tolerances import Tolerances
-from ppafo.identification.trajectory.experiment import FittedExperiment, stated_by, tolerance_parameters
+from ppafo.identification.trajectory.experiment import FittedExperiment, tolerance_parameters
 from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.audit import findings_of
 from ppafo.parameters.audit.changes import changes
@@ -257,14 +257,13 @@ def test_friction_that_contradicts_itself_is_told_and_fails(solved: Solve) -> No
     assert not outcome.is_good
 
 
-def test_figures_and_files_are_there_for_each_procedure_and_figure_3_for_both(solved: Solve) -> None:
+def test_figures_and_files_are_there_for_each_procedure(solved: Solve) -> None:
     files = files_of(finding_of(solved(STATIC + DECAY)))
     names = {"twin.toml", "identify.json", "identify.txt", "report.html"}
-    names |= {f"{name}.{kind}" for name in ("static-torque", "free-decay", "figure-3") for kind in ("png", "svg")}
+    names |= {f"{name}.{kind}" for name in ("static-torque", "free-decay") for kind in ("png", "svg")}
     assert set(files) == names
-    assert files["figure-3.png"].startswith(b"\x89PNG")
+    assert files["free-decay.png"].startswith(b"\x89PNG")
     assert json.loads(files["identify.json"])["procedures"][0]["recordings_are"] == "synthetic"
-    assert "figure-3.png" not in files_of(finding_of(solved(STATIC)))
 
 
 @pytest.mark.parametrize(
@@ -444,8 +443,8 @@ def test_bench_and_trajectory_hold_a_number_alike() -> None:
     chosen, device = BenchContext(load_parameter_set("ppafo2011"), "proportional", "here"), load_device("ppafo2011")
     scenario = load_scenario("step-response", ["motion.kind=free"])
     experiment = FittedExperiment("step", scenario, simulate(scenario).recording)
-    stated = stated_by(chosen.parameter_set, scenario)
-    held = {one.path: one.deviation for one in tolerance_parameters(Tolerances(), (experiment,), (), stated)}
+    found = tolerance_parameters(Tolerances(), (experiment,), (), chosen.parameter_set)
+    held = {one.path: one.deviation for one in found}
     leak = VaneLeakProblem(kind="vane-leak", recordings=("leak.csv",), angle=math.radians(60.0))
     decay = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",))
     told = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",), inertia=8.4e-3)

@@ -30,7 +30,7 @@ from ppafo.identification.bench.law import (
 )
 from ppafo.identification.bench.readings import check_no_wrong_reading, check_sources, meter_readings
 from ppafo.identification.estimate import Verdict
-from ppafo.identification.fit import SHAPE, Conflict
+from ppafo.identification.fit import SHAPE, other_shape
 from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.source import RecordingSource, Sources, pool
 from ppafo.model.effects.kind import SECTION
@@ -147,7 +147,7 @@ class ValveMapProblem(FlowLaw):
                     f"an opening whose corners are rounded over {rounded.by_name[_ROUND]:.2g} of the command, through "
                     "which gas flows from the first command on, explains them better (nodes make a table of it)"
                 )
-                fitted = replace(fitted, conflict=Conflict("mass_flow", SHAPE, math.sqrt(2.0 * gain), 0.0))
+                fitted = replace(fitted, conflict=other_shape("mass_flow", math.sqrt(2.0 * gain)))
         if not (is_two_way or self.nodes):
             no_play = (
                 "the command was swept in one direction only: the dead band includes half the width of any hysteresis"

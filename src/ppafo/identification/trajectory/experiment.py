@@ -3,23 +3,28 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.errors import IdentificationError, PpafoError, noted_in, raise_noted
+from ppafo.errors import IdentificationError, PpafoError, ScenarioError, UnitError, noted_in, raise_noted, refused_as
+from ppafo.identification.bench.law import BenchContext
+from ppafo.identification.estimate import Estimate, interval_factor
 from ppafo.identification.least_squares import FitNumber
 from ppafo.identification.new_set import fitting_unit, stated_half_width
-from ppafo.identification.source import UsedRecording, double_use
+from ppafo.identification.source import RecordingReader, UsedRecording, double_use
 from ppafo.identification.tolerances import Tolerances
 from ppafo.model.catalog import VALVES, find_effects
 from ppafo.model.declaration import Quantity
+from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.device import Device
 from ppafo.parameters.effects import switches_of
+from ppafo.parameters.overrides import over
 from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.signals.recording import Recording
 from ppafo.simulation import numbers
-from ppafo.simulation.declaration import FREE, INITIAL, LEG, shank_settings
+from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.numbers import other_form
 from ppafo.simulation.recorded.channels import (
     ANGLE,
@@ -35,7 +40,8 @@ from ppafo.simulation.recorded.channels import (
 )
 from ppafo.simulation.recorded.inputs import between_stops, supply_paths, with_highest_supply
 from ppafo.simulation.recorded.motion import motion_at, read_error
-from ppafo.simulation.recorded.rest import value_at_rest
+from ppafo.simulation.recorded.replay import locked_vane, replay_scenario, with_fixed_volume
+from ppafo.simulation.recorded.rest import start_of, value_at_rest
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.simulation.scenario import (
     PYTHON_CONTROLLER,
@@ -46,7 +52,11 @@ from ppafo.simulation.scenario import (
     vane_motion,
     with_control,
 )
+from ppafo.units import parse_quantity
 from ppafo.wording import first_twice, known_names
+
+if TYPE_CHECKING:
+    from ppafo.identification.problem import ExperimentSection, ParameterSection, TrajectorySection
 
 FITTED_CHANNELS = ("angle", "pressure_1", "pressure_2")
 """Channels that a fit can compare with a recording [rad], [Pa], [Pa]."""
@@ -54,8 +64,6 @@ INPUTS = (COMMAND, SUPPLY, EXTERNAL_TORQUE)
 """Recorded channels that drive a run without a scenario, sample by sample."""
 ALL_INPUTS = (*INPUTS, DORSIFLEXION_SUPPLY, ANGLE)
 """Recorded channels that may replace inputs of the scenario; a recorded angle is a prescribed motion."""
-InitialState = Literal["scenario", "recording"]
-"""Source of the initial angle and pressures of a run."""
 _FITS = 1.0e-6
 """Rounding tolerance [s] of sample times at the start of an experiment."""
 TIME_OFFSET = "recording.time_offset"
@@ -87,6 +95,10 @@ _FURTHEST = 100.0
 """Default bounds of a positive parameter, as the largest ratio to its start value, up and down [-]."""
 _SCALE = 100.0
 """Scale of a parameter with a prior, in standard deviations [-]; a finite difference is at most 0.001 scales."""
+_FITTED_SECTIONS = frozenset(
+    ("gas", "actuator", "friction", "foot_plate", "supply", "flow", "valve", "effects", "motion", "initial")
+)
+"""Sections of a scenario and its device whose numbers a fit may change; motion, where the vane is free."""
 _STATE = frozenset({"motion", "initial"})
 """Sections with the initial state of a run, which a recording may give more accurately."""
 _SUPPLIES = {"supply.pressure": "plant.supply_pressure", "supply.dorsiflexion_pressure": "plant.dorsiflexion_pressure"}
@@ -114,9 +126,9 @@ class FittedExperiment:
     ``channels`` are compared from the start to the end of the recording. ``noise`` is a lower bound of the standard
     deviation by channel [rad], [Pa]; the noise itself is estimated from the residuals. ``inputs`` are recorded channels
     that drive the run, sample by sample: ``command`` (replaces the controller), ``supply_pressure`` (of both inlets if
-    they share a pressure), ``dorsiflexion_pressure``, ``external_torque``, ``angle``. ``initial_state`` selects the
-    source of the initial angle and pressures: the scenario, or the samples of the recording up to the start (their mean
-    or, if they move, the end of a line through them). ``source`` names the file and its hash.
+    they share a pressure), ``dorsiflexion_pressure``, ``external_torque``, ``angle``. With ``is_recorded_start`` the
+    initial angle and pressures are not those of the scenario, but of the samples up to the start (their mean or, if
+    they move, the end of a line through them). ``source`` names the file and its hash.
     """
 
     label: str
@@ -126,13 +138,20 @@ class FittedExperiment:
     channels: tuple[str, ...] = FITTED_CHANNELS
     noise: Mapping[str, float] = field(default_factory=dict)
     inputs: tuple[str, ...] = ()
-    initial_state: InitialState = "scenario"
+    is_recorded_start: bool = False
     source: str = ""
 
     @property
     def is_read(self) -> bool:
         """True if the run starts from the recorded state."""
-        return self.initial_state == "recording" or self.scenario.controller.is_outside
+        return self.is_recorded_start or self.scenario.controller.is_outside
+
+    @property
+    def use(self) -> UsedRecording:
+        """Part of the recording with which the experiment is compared."""
+        span = self.start, float(self.recording.time[-1])
+        trace, channels = self.source or self.recording.label, frozenset(self.channels)
+        return UsedRecording(f"experiment '{self.label}'", trace, self.recording, channels, *span)
 
 
 def check_experiment(experiment: FittedExperiment) -> None:
@@ -196,7 +215,7 @@ def scenario_of(experiment: FittedExperiment) -> Scenario:
         # From here the recorded angle prescribes the vane's.
         angle = np.interp([experiment.start], recording.time, recording[ANGLE])
         scenario = replace(scenario, motion=FreeMotion(float(between_stops(angle, scenario.device, where)[0])))
-    if experiment.initial_state == "scenario":
+    if not experiment.is_recorded_start:
         return scenario
     before = recording.time <= experiment.start + _FITS
     if not before.any():
@@ -226,13 +245,6 @@ def motion_at_start(experiment: FittedExperiment) -> tuple[float, float, float] 
     return motion_at(experiment.recording, experiment.start)
 
 
-def use_of(experiment: FittedExperiment) -> UsedRecording:
-    """Return the part of the recording with which an experiment is compared."""
-    used, recording = frozenset(experiment.channels), experiment.recording
-    label, trace = f"experiment '{experiment.label}'", experiment.source or recording.label
-    return UsedRecording(label, trace, recording, used, experiment.start, float(recording.time[-1]))
-
-
 def full_path(path: str, scenario: Scenario) -> str:
     """Return the path as in a parameter set: ``valve.area`` becomes ``valves.NAME.area`` with the chosen valve."""
     section, _, name = path.partition(".")
@@ -241,20 +253,15 @@ def full_path(path: str, scenario: Scenario) -> str:
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declarations of all parameters that can be fitted in this scenario, by path."""
-    device = scenario.device
+    device, moves = scenario.device, vane_motion(scenario).profile is None
     # An orifice has two forms, and the device one of them.
     other = {f"{section}.{name}" for section in ("actuator.leak", "valve") for name in other_form(device, section)}
     declared = {
         full_path(path, scenario): quantity
-        for path, quantity in numbers.device_numbers(device).items()
+        for path, quantity in numbers.declared_numbers(scenario).items()
         if path not in other
+        and path.partition(".")[0] in (_FITTED_SECTIONS if moves else _FITTED_SECTIONS - {"motion"})
     }
-    leg = vane_motion(scenario).leg
-    if vane_motion(scenario).profile is None:
-        declared |= {f"motion.{quantity.name}": quantity for quantity in (FREE if leg is None else LEG)}
-        shank = () if leg is None else shank_settings(leg.shank.kind)
-        declared |= {f"motion.shank.{quantity.name}": quantity for quantity in shank}
-    declared |= numbers.of_its_chambers({f"initial.{quantity.name}": quantity for quantity in INITIAL}, device)
     return declared | {f"recording.{quantity.name}": quantity for quantity in RECORDING}
 
 
@@ -301,13 +308,12 @@ def number_of(parameter: FitNumber, experiments: Sequence[FittedExperiment]) -> 
     Raises IdentificationError for contradictory settings.
     """
     scenarios = [experiment.scenario for experiment in experiments]
-    paths = {full_path(parameter.path, scenario) for scenario in scenarios}
-    if len(paths) > 1:
+    path, *others = sorted({full_path(parameter.path, scenario) for scenario in scenarios})
+    if others:
         raise IdentificationError(
-            f"{parameter.path} refers to {' and '.join(sorted(paths))} in these experiments and cannot be fitted as "
+            f"{parameter.path} refers to {' and '.join((path, *others))} in these experiments and cannot be fitted as "
             "one parameter; give one of these paths, and in recordings the experiments that have it"
         )
-    path = paths.pop()
     quantity = [declaration_of(path, scenario) for scenario in scenarios][-1]
     for experiment in experiments:
         # No number moves an input that the run follows as it was recorded.
@@ -320,25 +326,22 @@ def number_of(parameter: FitNumber, experiments: Sequence[FittedExperiment]) -> 
                 f"{parameter.name}: the run of experiment '{experiment.label}' uses the recorded '{channel}', so this "
                 "parameter has no effect"
             )
-    start = parameter.start
+    start, low, high = parameter.start, quantity.minimum, quantity.maximum
     if math.isnan(start):
         # Of how a run begins the recording may say more than the scenario.
         is_state = path.partition(".")[0] in _STATE
         start = number_at(scenario_of(experiments[0]) if is_state else scenarios[0], path)
-    low, high = quantity.minimum, quantity.maximum
     if path == TIME_OFFSET:
         low, high = -LONGEST_TIME_OFFSET, LONGEST_TIME_OFFSET
     elif start > 0.0:
         # A number above 0 is bounded by factors: with 0 as its lower bound a valve or an effect would be another model.
         low, high = max(low, start / _FURTHEST) if low >= 0.0 else low, min(high, start * _FURTHEST)
-    low, high = (
-        low if math.isnan(parameter.low) else parameter.low,
-        high if math.isnan(parameter.high) else parameter.high,
-    )
+    low = low if math.isnan(parameter.low) else parameter.low
+    high = high if math.isnan(parameter.high) else parameter.high
     bounds = f"{low:.6g} and {high:.6g}"
-    has_size = math.isfinite(high - low) or math.isfinite(parameter.deviation)
-    is_allowed = quantity.minimum <= low and high <= quantity.maximum
     allowed = f"{quantity.minimum:.6g} to {quantity.maximum:.6g} {quantity.unit}".rstrip()
+    has_size = math.isfinite(high - low) or math.isfinite(parameter.deviation)
+    is_from_zero = 0.0 in (low, start) and not parameter.is_tolerance
     refuse_first(
         parameter.name,
         (not low < high, f"low = {low:.6g} must be below high = {high:.6g}"),
@@ -346,33 +349,32 @@ def number_of(parameter: FitNumber, experiments: Sequence[FittedExperiment]) -> 
         (start == 0.0 and not has_size, "start = 0 needs bounds, which define the step size of the search"),
         (not parameter.deviation > 0.0, "the standard deviation of a prior must be above 0"),
         (
-            0.0 in (low, start) and not parameter.is_tolerance and _is_off_at_zero(scenarios[0], path, high),
+            is_from_zero and _model_at(scenarios[0], path, 0.0) != _model_at(scenarios[0], path, high),
             "0 leaves it out of the model, so it cannot be fitted from there; start and low must be above 0",
         ),
-        (not is_allowed, f"the bounds {bounds} exceed the allowed range, {allowed}"),
+        (
+            not (quantity.minimum <= low and high <= quantity.maximum),
+            f"the bounds {bounds} exceed the allowed range, {allowed}",
+        ),
     )
     if parameter.is_logarithm:
         start, low, high = math.log(start), math.log(low), math.log(high)
     # Differences are a thousandth of the scale at most, which for a prior is a tenth of its deviation.
-    scale = abs(start) or 0.5 * (high - low)
-    if math.isfinite(parameter.deviation):
-        scale = _SCALE * parameter.deviation
+    is_known = math.isfinite(parameter.deviation)
+    scale = _SCALE * parameter.deviation if is_known else abs(start) or 0.5 * (high - low)
     unit = quantity.unit.removesuffix("_a").removesuffix("_d") or "-"
     # Of a quantity of either sign, such as the zero of a sensor, the value may be zero.
     size = scale if low < 0.0 < high else None
     return replace(parameter, path=path, start=start, low=low, high=high, scale=scale, unit=unit, size=size)
 
 
-def _is_off_at_zero(scenario: Scenario, path: str, value: float) -> bool:
-    """Return whether a parameter selects another model at 0 than at ``value`` [SI], such as a delay or an effect."""
-    models = []
-    for number in (0.0, value):
-        device = with_numbers(scenario, {path: number}).device
-        kind = VALVES[device.valve.kind]
-        settings = kind.settings(**device.valve.settings)
-        valve = kind.choose(settings)
-        models.append((valve, valve.command_delay(settings) > 0.0, switches_of(device)))
-    return models[0] != models[1]
+def _model_at(scenario: Scenario, path: str, value: float) -> tuple[object, ...]:
+    """Return the model that a parameter selects at a value [SI]: at 0 a delay or an effect is left out."""
+    device = with_numbers(scenario, {path: value}).device
+    kind = VALVES[device.valve.kind]
+    settings = kind.settings(**device.valve.settings)
+    valve = kind.choose(settings)
+    return valve, valve.command_delay(settings) > 0.0, switches_of(device)
 
 
 def reach_of(chosen: Sequence[FitNumber]) -> float:
@@ -383,105 +385,99 @@ def reach_of(chosen: Sequence[FitNumber]) -> float:
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryProblem:
-    """Trajectory fit problem: parameters and experiments. Raises IdentificationError if inconsistent."""
+    """Trajectory fit problem: parameters and experiments. Raises IdentificationError if inconsistent.
+
+    Samples that bench procedures ``used`` are in their intervals, which are priors here. ``numbers`` are the parameters
+    with start and bounds resolved.
+    """
 
     parameters: tuple[FitNumber, ...]
     experiments: tuple[FittedExperiment, ...]
     confidence: float = 0.95
+    used: tuple[UsedRecording, ...] = ()
+    numbers: tuple[FitNumber, ...] = field(init=False)
 
     def __post_init__(self) -> None:
         labels = [experiment.label for experiment in self.experiments]
-        _refuse_twice("experiment", labels)
         for experiment in self.experiments:
             check_experiment(experiment)
-        if message := double_use(use_of(experiment) for experiment in self.experiments):
+        if message := double_use((*self.used, *(experiment.use for experiment in self.experiments))):
             raise IdentificationError(message)
+        numbers, wrong = list[FitNumber](), list[PpafoError]()
         for parameter in self.parameters:
-            for label in parameter.recordings:
-                if label not in labels:
-                    known = known_names(label, labels)
-                    raise IdentificationError(f"{parameter.path}: there is no experiment '{label}'{known}")
-        _refuse_twice("parameter", [number.name for number in numbers_of(self)])
-
-
-def numbers_of(problem: TrajectoryProblem) -> tuple[FitNumber, ...]:
-    """Return all parameters of a problem with start and bounds resolved. Raises IdentificationError if inconsistent."""
-    numbers, wrong = list[FitNumber](), list[PpafoError]()
-    for parameter in problem.parameters:
-        labels = parameter.recordings
-        acting = [experiment for experiment in problem.experiments if not labels or experiment.label in labels]
-        with noted_in(wrong):
-            numbers.append(number_of(parameter, acting))
-    raise_noted(wrong)
-    return tuple(numbers)
-
-
-def _refuse_twice(kind: str, names: list[str]) -> None:
-    """Raise IdentificationError for a duplicated name; ``kind`` is the noun for the message."""
-    if (twice := first_twice(names)) is not None:
-        raise IdentificationError(f"{kind} '{twice}' is given twice")
-
-
-def stated_by(parameter_set: ParameterSet, scenario: Scenario) -> dict[str, float]:
-    """Return the half-widths of 95 % intervals stated in a parameter set [SI], by path."""
-    found = {}
-    for path, quantity in declared_numbers(scenario).items():
-        entry = parameter_set.numbers.get(path)
-        if entry is not None and entry.uncertainty:
-            found[path] = stated_half_width(entry, fitting_unit(entry.unit, quantity))
-    return found
+            for label in (label for label in parameter.recordings if label not in labels):
+                near = known_names(label, labels)
+                raise IdentificationError(f"{parameter.path}: there is no experiment '{label}'{near}")
+            with noted_in(wrong):
+                numbers.append(
+                    number_of(parameter, [item for item in self.experiments if parameter.acts_in(item.label)])
+                )
+        raise_noted(wrong)
+        for kind, names in (("experiment", labels), ("parameter", [number.name for number in numbers])):
+            if (twice := first_twice(names)) is not None:
+                raise IdentificationError(f"{kind} '{twice}' is given twice")
+        object.__setattr__(self, "numbers", tuple(numbers))
 
 
 def tolerance_parameters(
     tolerances: Tolerances,
     experiments: Sequence[FittedExperiment],
     fitted: Sequence[FitNumber],
-    stated: Mapping[str, float] | None = None,
+    parameter_set: ParameterSet | None = None,
 ) -> tuple[FitNumber, ...]:
     """Return all tolerances, except parameters already ``fitted``, as fit parameters with priors.
 
-    ``stated`` are the half-widths of the 95 % intervals stated in the set [SI], by path.
+    Fixed parameters of the device have the uncertainty that ``parameter_set`` states, or the default of the bench.
     """
     parameters: list[FitNumber] = []
     for experiment in experiments:
-        free = {
-            full_path(item.path, experiment.scenario)
-            for item in fitted
-            if not item.recordings or experiment.label in item.recordings
-        }
-        for path, (start, deviation) in _of_run(tolerances, experiment).items():
+        free = {full_path(item.path, experiment.scenario) for item in fitted if item.acts_in(experiment.label)}
+        begun = scenario_of(experiment)
+        for path, deviation in _of_run(tolerances, experiment, begun).items():
             if path not in free and deviation > 0.0:
-                parameters.append(_parameter(path, start, deviation, (experiment.label,)))
+                parameters.append(_tolerance(path, number_at(begun, path), deviation, (experiment.label,)))
     # A fitted number takes up the error of its path: a tolerance beside it could not be told apart.
-    given = {full_path(item.path, experiments[0].scenario) for item in fitted}
-    for kind, prefix, limit_of in (
-        ("zero", ZERO_OF, tolerances.zero_of),
-        ("gain", GAIN_OF, tolerances.gain_of),
-        ("lag", LAG_OF, tolerances.lag_of),
+    scenario = experiments[0].scenario
+    given = {full_path(item.path, scenario) for item in fitted}
+    supplies = SUPPLY, DORSIFLEXION_SUPPLY
+    for kind, prefix, channels, limit_of in (
+        ("zero", ZERO_OF, (*FITTED_CHANNELS, *supplies), tolerances.zero_of),
+        ("gain", GAIN_OF, FITTED_CHANNELS, tolerances.gain_of),
+        ("lag", LAG_OF, FITTED_CHANNELS, tolerances.lag_of),
     ):
-        for channel in (*FITTED_CHANNELS, *((SUPPLY, DORSIFLEXION_SUPPLY) if kind == "zero" else ())):
-            labels = [
+        is_own = kind in tolerances.each_recording
+        for channel in channels:
+            labels = tuple(
                 item.label
                 for item in experiments
                 if (channel in item.channels and (kind != "lag" or regular_interval(item.recording.time)))
                 or (kind == "zero" and channel in item.inputs)
-            ]
+            )
             path, limit = f"{prefix}{channel}", limit_of(channel)
             # A number with a prior of no width cannot be moved.
             if not labels or not limit > 0.0 or path in given:
                 continue
-            groups = [(label,) for label in labels] if kind in tolerances.each_recording else [tuple(labels)]
-            for group in groups:
-                is_common = len(group) == len(experiments) and kind not in tolerances.each_recording
-                parameter = _parameter(path, 0.0, deviation_of_limit(limit), () if is_common else group)
-                parameters.append(
-                    replace(parameter, low=-_LONGEST_LAG, high=_LONGEST_LAG) if kind == "lag" else parameter
-                )
-    return (
-        *parameters,
-        *_of_set(tolerances, experiments, given, stated or {}),
-        *_stribeck(tolerances, experiments, given),
-    )
+            common = () if len(labels) == len(experiments) else labels
+            for group in [(label,) for label in labels] if is_own else [common]:
+                number = _tolerance(path, 0.0, deviation_of_limit(limit), group)
+                lag = replace(number, low=-_LONGEST_LAG, high=_LONGEST_LAG)
+                parameters.append(lag if kind == "lag" else number)
+    # A parameter linked to another one has no uncertainty of its own, and of an effect that is off no number acts.
+    following = {path for path, links in scenario.device.links.items() if not all(link.when for link in links)}
+    off = {effect.section for effect, is_on in switches_of(scenario.device).items() if not is_on}
+    skipped = {"motion", "initial", "recording", "motion.shank", "supply", *off}
+    for path, quantity in declared_numbers(scenario).items():
+        section, _, name = path.rpartition(".")
+        entry = None if parameter_set is None else parameter_set.numbers.get(path)
+        stated = 0.0 if entry is None else stated_half_width(entry, fitting_unit(entry.unit, quantity))
+        value = number_at(scenario, path)
+        if path in given | following or section in skipped or value == 0.0 or (stated == 0.0 and name in _EXACT):
+            continue
+        kind = path.replace(f"valves.{scenario.device.valve_name}.", "valve.")
+        deviation = tolerances.deviation_of(kind, value, stated)
+        if deviation > 0.0:
+            parameters.append(_tolerance(path, value, deviation, quantity=quantity))
+    return (*parameters, *_stribeck(tolerances, experiments, given))
 
 
 def _stribeck(tolerances: Tolerances, experiments: Sequence[FittedExperiment], given: set[str]) -> Iterator[FitNumber]:
@@ -504,75 +500,171 @@ def _stribeck(tolerances: Tolerances, experiments: Sequence[FittedExperiment], g
     share = number_at(scenario, _SHARE)
     deviation = tolerances.deviation_of(_SHARE, share, 0.0)
     if (is_sought or limit > 0.0) and _SHARE not in given and deviation > 0.0:
-        yield _held(_SHARE, share, deviation, declared_numbers(scenario)[_SHARE])
+        yield _tolerance(_SHARE, share, deviation, quantity=declared_numbers(scenario)[_SHARE])
 
 
-def _of_run(tolerances: Tolerances, experiment: FittedExperiment) -> dict[str, tuple[float, float]]:
-    """Return initial state and operating conditions of a run as (start, standard deviation), by path [SI]."""
-    scenario, inputs, recording = scenario_of(experiment), experiment.inputs, experiment.recording
-    free = scenario.motion if isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is None else None
+def _of_run(tolerances: Tolerances, experiment: FittedExperiment, scenario: Scenario) -> dict[str, float]:
+    """Return standard deviations [SI] of initial state and operating conditions of an experiment, by path.
+
+    ``scenario`` is completed from the recording.
+    """
+    inputs, recording, is_read = experiment.inputs, experiment.recording, experiment.is_read
+    free = scenario.motion if isinstance(scenario.motion, FreeMotion) else None
     found = {}
-    if free is not None and EXTERNAL_TORQUE not in inputs and free.external_torque != 0.0:
+    if free is not None and free.leg is None and EXTERNAL_TORQUE not in inputs and free.external_torque != 0.0:
         found["motion.external_torque"] = deviation_of_limit(tolerances.load * abs(free.external_torque))
     if SUPPLY not in inputs:
         # Two regulators are set one by one, to one pressure too.
         found["supply.pressure"] = deviation_of_limit(tolerances.supply)
         if DORSIFLEXION_SUPPLY not in inputs:
             found["supply.dorsiflexion_pressure"] = deviation_of_limit(tolerances.supply)
-    is_read = experiment.is_read
+    read = math.hypot(_START_OF_ANGLE, read_error(recording, ANGLE))
     stops = scenario.device.actuator.angle_min, scenario.device.actuator.angle_max
     # Where the vane lies at a stop, the stop says where it starts.
-    if free is not None and ANGLE not in inputs and not any(math.isclose(free.angle, stop) for stop in stops):
-        stated = tolerances.start_of_angle
-        read = math.hypot(_START_OF_ANGLE, read_error(recording, ANGLE)) if is_read else 0.0
+    is_at_stop = free is not None and any(math.isclose(free.angle, stop) for stop in stops)
+    if free is not None and free.leg is None and ANGLE not in inputs and not is_at_stop:
         # The angle of a scenario was set by a sensor, whose zero is known to this limit.
-        usual = read or deviation_of_limit(tolerances.zero_of_angle)
+        usual = read if is_read else deviation_of_limit(tolerances.zero_of_angle)
+        stated = tolerances.start_of_angle
         found["motion.angle"] = usual if stated is None else deviation_of_limit(stated)
-    if isinstance(scenario.motion, FreeMotion) and (start := motion_at_start(experiment)) is not None:
+    if free is not None and (start := motion_at_start(experiment)) is not None:
         found["motion.angular_velocity"] = start[2]
-        found.setdefault("motion.angle", math.hypot(_START_OF_ANGLE, read_error(recording, ANGLE)))
+        found.setdefault("motion.angle", read)
     for name in ("pressure_1", "pressure_2"):
-        noise = read_error(recording, name) if is_read else 0.0
-        stated = tolerances.start_of_pressure
+        noise, stated = read_error(recording, name) if is_read else 0.0, tolerances.start_of_pressure
         found[f"initial.{name}"] = noise if stated is None else deviation_of_limit(stated)
-    return {path: (number_at(scenario, path), deviation) for path, deviation in found.items()}
+    return found
 
 
-def _of_set(
-    tolerances: Tolerances, experiments: Sequence[FittedExperiment], given: set[str], stated: Mapping[str, float]
-) -> Iterator[FitNumber]:
-    """Yield the fixed parameters of the device as fit parameters, each with its uncertainty as prior.
+def _tolerance(
+    path: str, start: float, deviation: float, recordings: tuple[str, ...] = (), quantity: Quantity | None = None
+) -> FitNumber:
+    """Return a quantity with a prior [SI] as a fit parameter, within what a ``quantity`` of the device may be."""
+    low, high = start - _WIDEST * deviation, start + _WIDEST * deviation
+    if quantity is not None:
+        # A volume or a friction of 0 would make no device.
+        least = max(quantity.minimum, 0.05 * start) if quantity.minimum >= 0.0 else quantity.minimum
+        low, high = max(low, least), min(high, quantity.maximum)
+    return FitNumber(path, start, low, high, 1.0, deviation, recordings, is_tolerance=True)
 
-    A parameter linked to another one has no uncertainty of its own.
+
+def problem_of(
+    section: "TrajectorySection",
+    context: BenchContext,
+    reader: RecordingReader,
+    bench: Mapping[str, Estimate],
+    used: tuple[UsedRecording, ...],
+) -> TrajectoryProblem:
+    """Convert section [trajectory] of a problem file to a fit problem; its set and valve are those of all scenarios.
+
+    ``bench`` are estimates of bench procedures by path, ``used`` the recordings from which these were obtained. Raises
+    IdentificationError for what cannot be fitted.
     """
-    scenario = experiments[0].scenario
-    following = {path for path, links in scenario.device.links.items() if not all(link.when for link in links)}
-    off = {effect.section for effect, is_on in switches_of(scenario.device).items() if not is_on}
-    for path, quantity in declared_numbers(scenario).items():
-        section, _, name = path.rpartition(".")
-        if path in given or section in ("motion", "initial", "recording", "motion.shank") or path.startswith("supply."):
-            continue
-        if path in following:
-            continue
-        value, half_width = number_at(scenario, path), stated.get(path, 0.0)
-        # An effect that is off has no numbers that act.
-        if section in off or value == 0.0 or (half_width == 0.0 and name in _EXACT):
-            continue
-        kind = path.replace(f"valves.{scenario.device.valve_name}.", "valve.")
-        deviation = tolerances.deviation_of(kind, value, half_width)
-        if deviation > 0.0:
-            yield _held(path, value, deviation, quantity)
+    experiments = tuple(_experiment(entry, context, reader) for entry in section.experiments)
+    scenarios = {experiment.label: experiment.scenario for experiment in experiments}
+    parameters = [_parameter(entry, scenarios, context.label, bench) for entry in section.parameters]
+    for entry in section.experiments:
+        if (limit := entry.time_offset) is not None:
+            # The delay of the samples of one recording is known within a limit, as a tolerance is.
+            known = deviation_of_limit(limit), (entry.label,)
+            parameters.append(FitNumber(TIME_OFFSET, 0.0, -limit, limit, 1.0, *known, is_tolerance=True))
+    tolerances = tolerance_parameters(context.tolerances, experiments, parameters, context.parameter_set)
+    return TrajectoryProblem((*parameters, *tolerances), experiments, section.confidence, used)
 
 
-def _held(path: str, value: float, deviation: float, quantity: Quantity) -> FitNumber:
-    """Return a fixed parameter of the device, with its standard deviation [SI] as prior, as a fit parameter."""
-    low = max(quantity.minimum, value - _WIDEST * deviation)
-    high = min(quantity.maximum, value + _WIDEST * deviation)
-    # A volume or a friction of 0 would make no device.
-    low = max(low, 0.05 * value) if quantity.minimum >= 0.0 else low
-    return FitNumber(path, value, low, high, deviation=deviation, is_tolerance=True)
+def _experiment(entry: "ExperimentSection", context: BenchContext, reader: RecordingReader) -> FittedExperiment:
+    """Convert a table of a section to an experiment: recording, and scenario that models it.
+
+    Without a scenario the recorded inputs drive the run, from the first sample unless a start is given.
+    """
+    where = f"{context.label}: experiment '{entry.label}'"
+    source, *others = reader.read(entry.recording, entry.columns)
+    if others:
+        raise IdentificationError(
+            f"{entry.recording}: columns.{entry.columns}.trial selects {1 + len(others)} trials, but an experiment has "
+            "one recording; name one trial"
+        )
+    recording, start, inputs = source.recording, entry.start or 0.0, entry.inputs or ()
+    if entry.scenario is not None:
+        reason = "cannot be combined with a scenario, which prescribes the motion of the vane"
+        refuse_first(where, *((getattr(entry, name) is not None, f"{name} {reason}") for name in ("locked", "volume")))
+        scenario = scenario_named(entry.scenario, entry.overrides, context, reader.folder)
+    else:
+        inputs = tuple(name for name in INPUTS if name in recording) if entry.inputs is None else entry.inputs
+        is_locked, is_fixed = entry.locked is not None, entry.volume is not None
+        channels = ", ".join(recording.names)
+        refuse_first(
+            where,
+            (entry.initial_state == "scenario", "initial_state = 'scenario' needs a scenario"),
+            ((is_locked or is_fixed) and ANGLE in inputs, f"'{ANGLE}' cannot be an input with locked or volume"),
+            (is_locked and is_fixed, "locked and volume exclude each other: a fixed volume has no vane"),
+            (
+                COMMAND not in recording,
+                f"has no scenario, so its recording needs a channel '{COMMAND}'; available: {channels}",
+            ),
+            (COMMAND not in inputs, f"has no scenario, so inputs must have '{COMMAND}'"),
+        )
+        start = float(recording.time[0]) if entry.start is None else entry.start
+        replayed = recording.between(start, float(recording.time[-1]))
+        changed = apply_overrides(context.parameter_set, entry.overrides, valve=context.valve)
+        device, known = build_device(changed, context.valve), {} if entry.locked is None else {ANGLE: entry.locked}
+        if entry.volume is not None:
+            device, known = with_fixed_volume(device, entry.volume)
+        state = start_of(replayed, device, known, where)
+        motion = locked_vane(state.angle) if known else None
+        scenario = replay_scenario(recording, device, state, replayed.duration, where, motion)
+    compared = entry.channels
+    if compared is None:
+        # All that is neither locked nor followed; of a fixed volume its pressure.
+        is_prescribed = entry.locked is not None or ANGLE in (entry.inputs or ())
+        compared = FITTED_CHANNELS[1:] if is_prescribed else FITTED_CHANNELS
+        compared = compared if entry.volume is None else ("pressure_1",)
+        if scenario.device.actuator.has_one_chamber:
+            compared = tuple(name for name in compared if name != "pressure_2")
+    if entry.step is not None:
+        scenario = replace(scenario, run=replace(scenario.run, step=entry.step))
+    # The scenario of a replay has the state of the samples already.
+    is_read = entry.scenario is not None and entry.initial_state in ("recording", "fitted")
+    noise, trace = entry.noise.by_channel(), source.trace
+    return FittedExperiment(entry.label, scenario, recording, start, compared, noise, inputs, is_read, trace)
 
 
-def _parameter(path: str, start: float, deviation: float, recordings: tuple[str, ...]) -> FitNumber:
-    width = _WIDEST * deviation
-    return FitNumber(path, start, start - width, start + width, 1.0, deviation, recordings, is_tolerance=True)
+def scenario_named(name: str, overrides: tuple[str, ...], context: BenchContext, folder: Path) -> Scenario:
+    """Load a scenario, bundled or from a file in the ``folder`` of the problem, with the device of the problem."""
+    name_or_file = name if name in list_scenarios() else str(folder / name)
+    # The valve of the problem goes before what the experiment changes of it.
+    chosen = () if context.valve is None else (f"device.valve={context.valve}",)
+    return load_scenario(name_or_file, over(chosen, overrides, ScenarioError), context.parameter_set)
+
+
+def _parameter(
+    entry: "ParameterSection", scenarios: Mapping[str, Scenario], label: str, bench: Mapping[str, Estimate]
+) -> FitNumber:
+    """Convert a table of a section to a parameter to fit [SI]; ``scenarios`` are by label of the experiment."""
+    scenario = next((scenarios[name] for name in entry.recordings if name in scenarios), None)
+    acting = scenario or next(iter(scenarios.values()))
+    quantity = declaration_of(entry.path, acting)
+    atmosphere = acting.device.supply.atmospheric_pressure
+    where = f"{label}: parameter '{entry.path}'"
+    prior, texts = entry.prior, {"start": entry.start, "low": entry.low, "high": entry.high}
+    if prior is not None and prior != "bench":
+        texts["prior.mean"] = prior.mean
+    values, deviation = dict.fromkeys(("start", "low", "high"), math.nan), math.inf
+    for key, text in texts.items():
+        if text is not None:
+            with refused_as(IdentificationError, f"{where}: {key} = '{text}'", UnitError):
+                values[key] = parse_quantity(text, quantity.unit, atmosphere)
+    if prior == "bench":
+        estimate = bench.get(full_path(entry.path, acting))
+        if estimate is None or not estimate.is_usable:
+            identified = ", ".join(path for path, known in bench.items() if known.is_usable) or "none"
+            raise IdentificationError(
+                f"{where}: prior = 'bench' needs a value that a procedure of this problem identifies; identified: "
+                f"{identified}"
+            )
+        values["start"], deviation = estimate.value, estimate.wider_half_width / interval_factor(estimate.confidence)
+    elif prior is not None:
+        values["start"] = values.pop("prior.mean")
+        deviation = abs(values["start"]) * prior.relative
+    start, low, high = values.values()
+    return FitNumber(entry.path, start, low, high, 1.0, deviation, entry.recordings)

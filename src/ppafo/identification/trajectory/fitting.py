@@ -6,10 +6,9 @@ the search; their error tolerance is so small that it hardly affects finite diff
 
 import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,14 +20,17 @@ from ppafo.engine.rows import leaves, rebuilt
 from ppafo.engine.run import NEVER_FAILED, Run, batches_of, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.pneumatics import supply_range
-from ppafo.errors import IdentificationError, refused_as
-from ppafo.identification.estimate import Estimate, Identified, in_shown_unit
+from ppafo.errors import DataError, IdentificationError, refused_as
+from ppafo.identification.bench.law import BenchContext
+from ppafo.identification.estimate import Estimate, Identified, in_shown_unit, shown_text
 from ppafo.identification.fit import Fit, conflict_in_words, estimate_of
 from ppafo.identification.fit import fit as fit_residuals
 from ppafo.identification.least_squares import FitNumber, FitRuns, ResidualBlock
 from ppafo.identification.noise import Noise, whiten
-from ppafo.identification.source import kind_of
+from ppafo.identification.problem import TrajectorySection
+from ppafo.identification.source import RecordingReader, RecordingSource, UsedRecording, kind_of, remarks_on_readings
 from ppafo.identification.trajectory.experiment import (
+    FITTED_CHANNELS,
     GAIN_OF,
     LAG_OF,
     TIME_OFFSET,
@@ -37,8 +39,9 @@ from ppafo.identification.trajectory.experiment import (
     TrajectoryProblem,
     broken_rule,
     full_path,
-    numbers_of,
+    problem_of,
     reach_of,
+    scenario_named,
     scenario_of,
     with_numbers,
 )
@@ -71,15 +74,12 @@ _FELT = 1.0e-3
 """Least residuals that are tested as bursts [ranges of the samples]; smaller ones are the engine's."""
 _BURST = 6.0
 """Ratio of residuals to the noise that lasts [-] from which they are no noise; slow noise has up to 5.5."""
-_WHOLE = 1.0e-6
-"""Rounding tolerance of the last sample interval, as a fraction of an interval [-]."""
-
 FIT_TOLERANCE = 0.02
 """Error tolerance of a run of a fit, relative to a normal run [-]; finite differences are then accurate to 1e-3."""
 _FINER = 0.25
 """Relative tolerance [-] of the finer runs by which the integration error is estimated."""
 _FITS = 1.0e-6
-"""Rounding tolerance of sample times, as a fraction of a record interval [-], and in seconds."""
+"""Rounding tolerance of sample times, as a fraction of an interval [-], and in seconds."""
 
 _ZERO_OF_ANGLE = math.radians(1.0)
 """Largest distance of a reading from a stop [rad] at which the vane counts as resting at the stop."""
@@ -150,39 +150,33 @@ def prepare_samples(
     reach: float,
     numbers: Mapping[str, float],
     recorded: RecordedInputs | None = None,
+    tolerance: float = FIT_TOLERANCE,
 ) -> PreparedExperiment:
-    """Return a prepared experiment from samples, at ``numbers`` [SI], with time offsets up to ``reach`` [s]."""
-    run = replace(plan_run(with_numbers(scenario, numbers)), tolerance=FIT_TOLERANCE)
-    return _with_run(PreparedExperiment(scenario, run, measured, floors, reach, recorded), run)
+    """Return a prepared experiment from samples, at ``numbers`` [SI], with time offsets up to ``reach`` [s].
 
-
-def _with_run(prepared: PreparedExperiment, run: Run) -> PreparedExperiment:
-    """Return an experiment with a run whose records are no finer than the samples need."""
-    time, recorded = prepared.measured.time, prepared.recorded
-    every = _steps_between_samples(time, prepared.reach, run.step)
-    records = math.ceil((float(time[-1]) + prepared.reach) / (run.step * every) - _FITS)
-    frozen = replace(run, record_every=every, step_count=math.ceil(records * every - _FITS), needs_parts=True)
-    if recorded is not None and ANGLE in recorded.names and isinstance(prepared.scenario.motion, FreeMotion):
-        frozen = with_prescribed_angle(frozen, prepared.scenario.motion.angle)
-    inputs = None if recorded is None else step_inputs(recorded, prepared.scenario.device, frozen)
-    return replace(prepared, run=frozen, inputs=inputs)
-
-
-def _steps_between_samples(time: Floats, reach: float, step: float) -> float:
-    """Return the number of steps between records: a sample interval, or less if samples must be interpolated.
-
-    The result is a fraction of a step if a whole step is too long for interpolation.
+    The records of its run are no finer than the samples need.
     """
-    every = max(1, round(float(np.min(np.diff(time))) / step))
-    position = time / (step * every)
+    run = plan_run(with_numbers(scenario, numbers))
+    # Steps between records: those of a sample interval, or fewer if samples must be interpolated, and a fraction of a
+    # step if a whole one is too long for that.
+    time = measured.time
+    every: float = max(1, round(float(np.min(np.diff(time))) / run.step))
+    position = time / (run.step * every)
     is_aligned = bool(np.all(np.abs(position - np.round(position)) < _FITS * np.maximum(position, 1.0)))
-    if is_aligned and reach == 0.0:
-        return every
-    read_interval = max(_READ_INTERVAL, float(time[-1]) / _MAXIMUM_RECORDS)
-    most = read_interval / step * (1.0 + _FITS)
-    if most < 1.0:
-        return 1.0 / math.ceil(1.0 / most)
-    return max(count for count in range(1, int(most) + 1) if every % count == 0) if is_aligned else int(most)
+    if not is_aligned or reach > 0.0:
+        most = max(_READ_INTERVAL, float(time[-1]) / _MAXIMUM_RECORDS) / run.step * (1.0 + _FITS)
+        if most < 1.0:
+            every = 1.0 / math.ceil(1.0 / most)
+        else:
+            counts = range(1, int(most) + 1)
+            every = max(count for count in counts if every % count == 0) if is_aligned else counts[-1]
+    records = math.ceil((float(time[-1]) + reach) / (run.step * every) - _FITS)
+    steps = math.ceil(records * every - _FITS)
+    run = replace(run, tolerance=tolerance, record_every=every, step_count=steps, needs_parts=True)
+    if recorded is not None and ANGLE in recorded.names and isinstance(scenario.motion, FreeMotion):
+        run = with_prescribed_angle(run, scenario.motion.angle)
+    inputs = None if recorded is None else step_inputs(recorded, scenario.device, run)
+    return PreparedExperiment(scenario, run, measured, floors, reach, recorded, inputs)
 
 
 def columns_in(label: str, numbers: Sequence[FitNumber], points: Floats) -> dict[str, Floats]:
@@ -211,49 +205,6 @@ def signals_of(
     # Threads run at the same time, because compiled runs release the lock of the interpreter.
     with ThreadPoolExecutor(workers) as pool:
         return list(pool.map(signals_at, *arguments))
-
-
-def residuals_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[FitNumber], points: Floats) -> Floats:
-    """Return residuals, measured - model [SI] (samples of all channels, points), at points [SI] (numbers, points)."""
-    signals = signals_of(experiments, numbers, points)
-    return np.concatenate(
-        [
-            prepared.measured[name][:, None] - modelled[name]
-            for prepared, modelled in zip(experiments, signals, strict=True)
-            for name in prepared.measured.names
-        ]
-    )
-
-
-def blocks_of(
-    experiments: Sequence[PreparedExperiment], numbers: Sequence[FitNumber], point: Floats
-) -> tuple[ResidualBlock, ...]:
-    """Return the residual rows of each channel of each recording, with noise floor and integration error.
-
-    The floor is the given noise, the integration error or the rounding of the converter, whichever is largest. The
-    integration error is not independent noise: all samples of a recording share it.
-    """
-    blocks, first = [], 0
-    coarse = signals_of(experiments, numbers, point[:, None])
-    # The error is nearly proportional to the tolerance, so that finer runs show most of the error.
-    halved = []
-    for prepared in experiments:
-        scenario = replace(prepared.scenario, run=replace(prepared.scenario.run, step=0.5 * prepared.run.step))
-        run = plan_run(with_numbers(scenario, numbers_in(prepared.measured.label, numbers, point)))
-        halved.append(_with_run(prepared, replace(run, tolerance=_FINER * prepared.run.tolerance)))
-    fine = signals_of(halved, numbers, point[:, None])
-    for prepared, coarse_signals, fine_signals in zip(experiments, coarse, fine, strict=True):
-        for name in prepared.measured.names:
-            samples = prepared.measured[name]
-            error = (fine_signals[name][:, 0] - coarse_signals[name][:, 0]) / (1.0 - _FINER)
-            error = error if np.isfinite(error).all() else np.zeros_like(error)
-            rounded = rounding_of(samples, resolution_of(samples))
-            floor = max(prepared.floors.get(name, 0.0), float(np.sqrt(np.mean(np.square(error)))))
-            last = first + len(samples)
-            rows = slice(first, last)
-            blocks.append(ResidualBlock(prepared.measured.label, name, rows, np.maximum(floor, rounded), error))
-            first = last
-    return tuple(blocks)
 
 
 _NUMBERS_OF_RUN = (
@@ -294,89 +245,75 @@ def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], coun
     table = np.array([np.broadcast_to(column, (count,)) for column in running.values()]).reshape(-1, count)
     _, first, run_of = np.unique(table, axis=1, return_index=True, return_inverse=True)
     distinct = {path: np.broadcast_to(column, (count,))[first] for path, column in running.items()}
-    signals = _with_inputs(prepared, distinct, len(first))
+    signals = _ideal_signals(prepared, distinct, len(first))
     atmosphere = prepared.scenario.device.supply.atmospheric_pressure
+    interval = sample_period(prepared.measured.time)
     for name, values in signals.items():
         rest = 0.0 if name == ANGLE else atmosphere
         gain, zero = (np.asarray(errors.get(f"{path}{name}", 0.0)) for path in (GAIN_OF, ZERO_OF))
         read = values[:, run_of.ravel()]
-        if (lags := errors.get(f"{LAG_OF}{name}")) is not None:
-            read = _lagging(read, np.broadcast_to(lags, (count,)), sample_period(prepared.measured.time))
+        lags = np.broadcast_to(errors.get(f"{LAG_OF}{name}", 0.0), (count,))
+        # First-order lags, exact for straight lines between samples. A lag below 0 adds what the same lag above 0 takes
+        # away, so that a search can pass 0.
+        for lag in np.unique(lags[lags != 0.0]).tolist():
+            runs, left = lags == lag, math.exp(-interval / abs(lag))
+            straight = abs(lag) / interval * (1.0 - left)
+            from_start = read[:, runs] - read[:1, runs]
+            behind = lfilter([1.0 - straight, straight - left], [1.0, -left], from_start, axis=0) - from_start
+            read[:, runs] += math.copysign(1.0, lag) * behind
         signals[name] = rest + (1.0 + gain) * (read - rest) + zero
     return signals
 
 
-def _lagging(values: Floats, lags: Floats, interval: float) -> Floats:
-    """Return samples (samples, runs) behind first-order lags [s] (runs,): exact for straight lines between samples.
-
-    A lag below 0 adds what the same lag above 0 takes away, so that a search can pass 0.
-    """
-    lagging = values.copy()
-    for lag in np.unique(lags[lags != 0.0]).tolist():
-        runs, left = lags == lag, math.exp(-interval / abs(lag))
-        straight = abs(lag) / interval * (1.0 - left)
-        from_start = values[:, runs] - values[:1, runs]
-        behind = lfilter([1.0 - straight, straight - left], [1.0, -left], from_start, axis=0) - from_start
-        lagging[:, runs] += math.copysign(1.0, lag) * behind
-    return lagging
-
-
-def _with_inputs(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
-    """Return ideal sensor signals; runs with different zero errors of recorded inputs form separate batches."""
-    zeros = {path: column for path, column in columns.items() if path.startswith(ZERO_OF)}
-    others = {path: column for path, column in columns.items() if path not in zeros}
-    if not zeros or prepared.inputs is None:
-        return _run_signals(prepared, others, count)
-    distinct, group = np.unique(np.array(list(zeros.values())), axis=1, return_inverse=True)
-    signals: dict[str, Floats] = {}
-    for number, values_of_group in enumerate(distinct.T.tolist()):
-        members = np.flatnonzero(group.ravel() == number)
-        zero_of = {path.removeprefix(ZERO_OF): zero for path, zero in zip(zeros, values_of_group, strict=True)}
-        # Zero errors [rad], [Pa] are subtracted from recorded inputs; one sensor may measure both inlets.
-        both = zero_of.get(SUPPLY, 0.0)
-        offsets = {
-            "path.level": zero_of.get(ANGLE, 0.0),
-            "plant.supply_pressure": both,
-            "plant.dorsiflexion_pressure": zero_of.get(DORSIFLEXION_SUPPLY, both),
-        }
-        corrected = {path: values - offsets.get(path, 0.0) for path, values in prepared.inputs.parameters.items()}
-        inputs = replace(prepared.inputs, parameters=corrected)
-        of_group = {path: column[members] for path, column in others.items()}
-        for name, values in _run_signals(replace(prepared, inputs=inputs), of_group, len(members)).items():
-            signals.setdefault(name, np.empty((len(values), count)))[:, members] = values
+def _ideal_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
+    """Return the signals of ideal sensors [SI] (samples, runs); runs with other zeros of inputs are other batches."""
+    errors = {path.removeprefix(ZERO_OF): column for path, column in columns.items() if path.startswith(ZERO_OF)}
+    others = {path: column for path, column in columns.items() if not path.startswith(ZERO_OF)}
+    followed = [] if prepared.inputs is None else [*errors.values()]
+    distinct, group = np.unique(np.array(followed).reshape(-1, count), axis=1, return_inverse=True)
+    signals = {name: np.full((len(prepared.measured), count), np.nan) for name in prepared.measured.names}
+    for number, zeros in enumerate(distinct.T.tolist()):
+        chosen = np.flatnonzero(group.ravel() == number)
+        run = run_with(prepared, {path: column[chosen] for path, column in others.items()})
+        inputs = prepared.inputs
+        if inputs is not None and zeros:
+            # Zero errors [rad], [Pa] are subtracted from recorded inputs; one sensor may measure both inlets.
+            zero_of = dict(zip(errors, zeros, strict=True))
+            both = zero_of.get(SUPPLY, 0.0)
+            offsets = {
+                "path.level": zero_of.get(ANGLE, 0.0),
+                "plant.supply_pressure": both,
+                "plant.dorsiflexion_pressure": zero_of.get(DORSIFLEXION_SUPPLY, both),
+            }
+            read = {path: values - offsets.get(path, 0.0) for path, values in inputs.parameters.items()}
+            inputs = replace(inputs, parameters=read)
+        rows = state_row_numbers(run)
+        channel_rows = [rows[f"state.{name}"] for name in ("angle", "mass_1", "mass_2")]
+        records: Floats | None = None
+        failed = np.zeros(len(chosen), dtype=np.bool_)
+        # A program has up to 32 lanes; more runs are several batches.
+        for members, batch in batches_of(run, len(chosen)):
+            outcome = run_batch(batch, threads=1) if inputs is None else replay(batch, inputs)
+            ends = outcome.states
+            # A failed run, or one with states that are no numbers, has no residuals.
+            failed[members] = (ends[rows["result.failure_time"]] < NEVER_FAILED) | ~np.isfinite(ends).all(axis=0)
+            if records is None:
+                records = np.empty((len(channel_rows), len(outcome.record), len(chosen)))
+            for record, row in zip(records, channel_rows, strict=True):
+                record[:, members] = outcome.record[:, row]
+        assert records is not None
+        late = np.broadcast_to(others.get(TIME_OFFSET, np.array(0.0)), (count,))[chosen]
+        states = [_at_samples(record, prepared, late) for record in records]
+        numbers = leaves(run.plant)
+        # Pressures follow from mass and angle by the plant, whose numbers differ from run to run.
+        for element in np.flatnonzero(~failed).tolist():
+            plant = rebuilt(run.program.actuator.plant, [at(number, element) for number in numbers])
+            angle, mass_1, mass_2 = (state[:, element] for state in states)
+            pressures = pressures_of(run.program.actuator, plant, angle, mass_1, mass_2)
+            for name, values in zip(FITTED_CHANNELS, (angle, *pressures), strict=True):
+                if name in signals:
+                    signals[name][:, chosen[element]] = values
     return signals
-
-
-def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
-    """Return the signals of ideal sensors [SI] (samples, runs)."""
-    run = run_with(prepared, columns)
-    rows = state_row_numbers(run)
-    channel_rows = [rows[f"state.{name}"] for name in ("angle", "mass_1", "mass_2")]
-    records: Floats | None = None
-    failed = np.zeros(count, dtype=np.bool_)
-    # A program has up to 32 lanes; more runs are several batches.
-    for members, batch in batches_of(run, count):
-        outcome = run_batch(batch, threads=1) if prepared.inputs is None else replay(batch, prepared.inputs)
-        ends = outcome.states
-        # A failed run, or one with states that are no numbers, has no residuals.
-        failed[members] = (ends[rows["result.failure_time"]] < NEVER_FAILED) | ~np.isfinite(ends).all(axis=0)
-        if records is None:
-            records = np.empty((len(channel_rows), len(outcome.record), count))
-        for record, row in zip(records, channel_rows, strict=True):
-            record[:, members] = outcome.record[:, row]
-    assert records is not None
-    offsets = np.broadcast_to(columns.get(TIME_OFFSET, np.array(0.0)), (count,))
-    angle, mass_1, mass_2 = (_at_samples(record, prepared, offsets) for record in records)
-    signals = {name: np.full(angle.shape, np.nan) for name in ("angle", "pressure_1", "pressure_2")}
-    numbers = leaves(run.plant)
-    # Pressures follow from mass and angle by the plant, whose numbers differ from run to run.
-    for element in np.flatnonzero(~failed).tolist():
-        plant = rebuilt(run.program.actuator.plant, [at(number, element) for number in numbers])
-        states = angle[:, element], mass_1[:, element], mass_2[:, element]
-        pressure_1, pressure_2 = pressures_of(run.program.actuator, plant, *states)
-        signals["angle"][:, element] = angle[:, element]
-        signals["pressure_1"][:, element], signals["pressure_2"][:, element] = pressure_1, pressure_2
-    return {name: signals[name] for name in prepared.measured.names}
 
 
 def _at_samples(values: Floats, prepared: PreparedExperiment, offsets: Floats) -> Floats:
@@ -441,7 +378,6 @@ class TrajectoryFit(Identified):
     """
 
     problem: TrajectoryProblem
-    numbers: tuple[FitNumber, ...]
     fit: Fit
     covariance: Floats
     correlation: Floats
@@ -462,14 +398,20 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
 
     ``report`` receives the progress. Raises IdentificationError if the problem cannot be simulated.
     """
-    numbers = numbers_of(problem)
+    numbers = problem.numbers
     # Beside a lag a steep signal says little of other numbers, so it is a tolerance where recordings ask for it, and of
     # a dead time always, which it resembles so much that small residuals would not show it.
     steady = tuple(number for number in numbers if not (number.is_tolerance and number.path.startswith(LAG_OF)))
     if any(not number.is_tolerance and number.path.endswith(_DEAD_TIMES) for number in numbers):
         return _fit_of(problem, numbers, report)
     found = _fit_of(problem, steady, report)
-    if len(steady) < len(numbers) and (found.conflict or any(map(_follow_each_other, _residuals_in(found)))):
+    is_lagging = bool(found.conflict)
+    for _, _, residuals in _residuals(found.measurements, found.models):
+        # Residuals of some part of a recording have one sign, as white noise has not.
+        noise, sums = max(noise_of(residuals), 1.0e-300), np.cumsum(residuals, dtype=float)
+        runs = ((np.abs(sums[width:] - sums[:-width]).max(initial=0.0), width) for width in _WINDOWS)
+        is_lagging |= any(float(run) > _RUN * noise * math.sqrt(width) for run, width in runs)
+    if len(steady) < len(numbers) and is_lagging:
         report(Progress("trajectory fit: again, with sensors that lag"))
         lagging = _fit_of(problem, numbers, report)
         if lagging.fit.log_likelihood > found.fit.log_likelihood + _LAGS:
@@ -477,38 +419,63 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     return found
 
 
-def _residuals_in(found: TrajectoryFit) -> Iterator[Floats]:
-    """Yield the residuals [SI] of each channel of each experiment."""
-    for measured, model in zip(found.measurements, found.models, strict=True):
-        yield from (measured[name] - model[name] for name in measured.names if name in model)
-
-
-def _follow_each_other(residuals: Floats) -> bool:
-    """Return whether the residuals of some part of a recording have one sign, as white noise has not."""
-    noise = max(noise_of(residuals), 1.0e-300)
-    sums = np.cumsum(residuals, dtype=float)
-    return any(
-        float(np.abs(sums[width:] - sums[:-width]).max(initial=0.0)) > _RUN * noise * math.sqrt(width)
-        for width in _WINDOWS
-    )
+def _residuals(measurements: Sequence[Recording], models: Sequence[Recording]) -> list[tuple[Recording, str, Floats]]:
+    """Return the residuals [SI], measured - model, of each channel of each measurement."""
+    pairs = zip(measurements, models, strict=True)
+    return [(measured, name, measured[name] - model[name]) for measured, model in pairs for name in measured.names]
 
 
 def _fit_of(problem: TrajectoryProblem, numbers: tuple[FitNumber, ...], report: Report) -> TrajectoryFit:
-    """Return the fit of some numbers of a problem; those that are left out stay at their start values."""
-    start = np.array([number.start for number in numbers])
-    rows = {(item.path, item.recordings): row for row, item in enumerate(numbers) if not item.is_tolerance}
-    sought = list(numbers)
-    for (path, labels), row in rows.items():
-        dynamic = rows.get((_DYNAMIC, labels))
-        if path == _STATIC and dynamic is not None and math.isinf(numbers[row].deviation):
-            sought[row] = _excess(numbers[row], numbers[dynamic])
+    """Return the fit of some numbers of a problem; those that are left out stay at their start values.
+
+    Friction at rest is fitted as the excess over friction in motion, since it is at least as large.
+    """
+    start, sought = np.array([number.start for number in numbers]), list(numbers)
+    unknown = {(item.path, item.recordings): item for item in numbers if not item.is_tolerance}
+    for row, static in enumerate(numbers):
+        dynamic = unknown.get((_DYNAMIC, static.recordings))
+        if static.path != _STATIC or static.is_tolerance or math.isfinite(static.deviation) or dynamic is None:
+            continue
+        low, high = max(static.low - dynamic.high, 0.0), static.high - dynamic.low
+        if not low < high:
+            raise IdentificationError(
+                f"{static.name}: high = {static.high:.6g} N m must be above low = {dynamic.low:.6g} N m of "
+                f"{dynamic.name}, for friction at rest is at least friction in motion"
+            )
+        excess = min(max(static.start - dynamic.start, low), high)
+        sought[row] = replace(static, start=excess, low=low, high=high, scale=dynamic.scale, base=dynamic.name)
     runs = []
     for experiment in problem.experiments:
         reach = reach_of([number for number in numbers if number.acts_in(experiment.label)])
         runs.append(prepare(experiment, numbers_in(experiment.label, numbers, start), reach))
     report(Progress(f"trajectory fit: {len(numbers)} numbers, {len(runs)} recordings"))
-    blocks = blocks_of(runs, numbers, start)
-    residuals = partial(residuals_of, runs, numbers)
+    # The error of the integration is nearly proportional to the tolerance, so that finer runs show most of it. It is no
+    # independent noise: all samples of a recording share it.
+    finer = []
+    for run in runs:
+        scenario = replace(run.scenario, run=replace(run.scenario.run, step=0.5 * run.run.step))
+        values = numbers_in(run.measured.label, numbers, start)
+        known = run.measured, run.floors, run.reach, values, run.recorded
+        finer.append(prepare_samples(scenario, *known, tolerance=_FINER * FIT_TOLERANCE))
+    blocks, first = list[ResidualBlock](), 0
+    coarse, fine = (signals_of(each, numbers, start[:, None]) for each in (runs, finer))
+    for run, coarse_signals, fine_signals in zip(runs, coarse, fine, strict=True):
+        for name in run.measured.names:
+            samples = run.measured[name]
+            error = (fine_signals[name][:, 0] - coarse_signals[name][:, 0]) / (1.0 - _FINER)
+            error = error if np.isfinite(error).all() else np.zeros_like(error)
+            floor = max(run.floors.get(name, 0.0), float(np.sqrt(np.mean(np.square(error)))))
+            least = np.maximum(floor, rounding_of(samples, resolution_of(samples)))
+            blocks.append(ResidualBlock(run.measured.label, name, slice(first, first + len(samples)), least, error))
+            first += len(samples)
+
+    def residuals(points: Floats) -> Floats:
+        signals = signals_of(runs, numbers, points)
+        pairs = ((run.measured, model) for run, model in zip(runs, signals, strict=True))
+        return np.concatenate(
+            [measured[name][:, None] - model[name] for measured, model in pairs for name in measured.names]
+        )
+
     for variables in (sought, numbers):
         fitted = fit_residuals(residuals, variables, blocks, problem.confidence, report, is_motion=True)
         # Bounds of friction at rest that its excess does not keep are kept by a search within them.
@@ -517,101 +484,73 @@ def _fit_of(problem: TrajectoryProblem, numbers: tuple[FitNumber, ...], report: 
             break
     for row in excesses:
         # Of friction at rest the bounds are its own; that it is above friction in motion stays.
-        fitted.low[row], fitted.high[row] = (
-            max(fitted.low[row], numbers[row].low),
-            min(fitted.high[row], numbers[row].high),
-        )
+        fitted.low[row] = max(fitted.low[row], numbers[row].low)
+        fitted.high[row] = min(fitted.high[row], numbers[row].high)
     own = tuple(replace(number, base=searched.base) for number, searched in zip(numbers, fitted.numbers, strict=True))
-    return _result(problem, numbers, runs, blocks, replace(fitted, numbers=own))
-
-
-def _excess(static: FitNumber, dynamic: FitNumber) -> FitNumber:
-    """Return friction at rest as the excess over friction in motion, since it is at least as large."""
-    low, high = max(static.low - dynamic.high, 0.0), static.high - dynamic.low
-    if not low < high:
-        raise IdentificationError(
-            f"{static.name}: high = {static.high:.6g} N m must be above low = {dynamic.low:.6g} N m of {dynamic.name}, "
-            "for friction at rest is at least friction in motion"
-        )
-    start = min(max(static.start - dynamic.start, low), high)
-    return replace(static, start=start, low=low, high=high, scale=dynamic.scale, base=dynamic.name)
+    return _result(problem, runs, blocks, replace(fitted, numbers=own))
 
 
 def _result(
-    problem: TrajectoryProblem,
-    numbers: tuple[FitNumber, ...],
-    runs: Sequence[PreparedExperiment],
-    blocks: Sequence[ResidualBlock],
-    fitted: Fit,
+    problem: TrajectoryProblem, runs: Sequence[PreparedExperiment], blocks: Sequence[ResidualBlock], fitted: Fit
 ) -> TrajectoryFit:
     """Return the result of a finished search: estimates, updated tolerances, and the model beside each recording."""
-    models, channels, outliers = list[Recording](), list[ChannelFit](), list[str]()
-    measurements = [run.measured for run in runs]
+    numbers, measurements, models = fitted.numbers, [run.measured for run in runs], list[Recording]()
     for measured, signals in zip(measurements, signals_of(runs, numbers, fitted.values[:, None]), strict=True):
         modelled = {name: Channel(column[:, 0], measured.unit(name)) for name, column in signals.items()}
-        model = Recording(f"model of {measured.label}", measured.time, modelled, kind="simulated")
-        models.append(model)
-        for name in measured.names:
-            residuals, sensor = measured[name] - model[name], fitted.sensors[name]
-            channels.append(
-                ChannelFit(
-                    experiment=measured.label,
-                    channel=name,
-                    unit=measured.unit(name),
-                    noise=sensor.deviation,
-                    order=sensor.order,
-                    rms=float(np.sqrt(np.mean(residuals * residuals))),
-                    largest=float(np.max(np.abs(residuals))),
-                    span=float(np.ptp(measured[name])),
-                )
-            )
-    times = {measured.label: measured.time for measured in measurements}
-    for block in blocks:
+        models.append(Recording(f"model of {measured.label}", measured.time, modelled, kind="simulated"))
+    channels, outliers = list[ChannelFit](), list[str]()
+    for (measured, name, residuals), block in zip(_residuals(measurements, models), blocks, strict=True):
+        sensor, rms = fitted.sensors[name], float(np.sqrt(np.mean(residuals * residuals)))
+        sizes = rms, float(np.max(np.abs(residuals))), float(np.ptp(measured[name]))
+        channels.append(ChannelFit(measured.label, name, measured.unit(name), sensor.deviation, sensor.order, *sizes))
         left_out = [row - block.rows.start for row in fitted.outliers if block.rows.start <= row < block.rows.stop]
         if left_out:
-            count, first = count_of(len(left_out), "outlier"), times[block.recording][left_out[0]]
-            text = f"{count} of {block.channel} left out, the first at {first:.6g} s"
-            outliers.append(f"experiment '{block.recording}': {text}")
-    conflict = conflict_in_words(fitted) or _wandering(fitted, numbers) or _bursting(measurements, models)
+            count, first = count_of(len(left_out), "outlier"), measured.time[left_out[0]]
+            outliers.append(f"experiment '{measured.label}': {count} of {name} left out, the first at {first:.6g} s")
+    conflict = conflict_in_words(fitted) or _wandering(fitted) or _bursting(measurements, models)
     # Tolerances are marginalised: their rows are left out, their share of the variance stays.
     rows = [row for row, number in enumerate(numbers) if not number.is_tolerance]
-    estimates = tuple(
-        estimate_of(fitted, row, [one.source or one.recording.label for one in experiments], conflict)
-        for row in rows
-        for experiments in [[one for one in problem.experiments if numbers[row].acts_in(one.label)]]
-    )
-    errors = np.sqrt(np.diag(fitted.covariance))
-    covariance = fitted.covariance[np.ix_(rows, rows)]
-    known = list[NuisanceParameter]()
-    for row, number in enumerate(numbers):
+    estimates = []
+    for row in rows:
+        acting = [one for one in problem.experiments if numbers[row].acts_in(one.label)]
+        sources = [one.source or one.recording.label for one in acting]
+        estimates.append(estimate_of(fitted, row, sources, conflict))
+    errors, known = np.sqrt(np.diag(fitted.covariance)), list[NuisanceParameter]()
+    for number, value, error in zip(numbers, fitted.values.tolist(), errors.tolist(), strict=True):
         if number.is_tolerance:
-            name = number.name
-            shares = {estimate.path: dict(fitted.shares[estimate.path]).get(name, 0.0) for estimate in estimates}
+            shares = {item.path: dict(fitted.shares[item.path]).get(number.name, 0.0) for item in estimates}
             widens = max(shares, key=lambda path: shares[path], default="")
-            pairs = [(number.start, number.deviation), (float(fitted.values[row]), float(errors[row]))]
+            pairs = [(number.start, number.deviation), (value, error)]
             if number.is_logarithm:
-                pairs = [(math.exp(value), math.exp(value) * deviation) for value, deviation in pairs]
-            known.append(NuisanceParameter(name, number.unit, *pairs[0], *pairs[1], widens, shares.get(widens, 0.0)))
+                pairs = [(math.exp(mean), math.exp(mean) * deviation) for mean, deviation in pairs]
+            share = shares.get(widens, 0.0)
+            known.append(NuisanceParameter(number.name, number.unit, *pairs[0], *pairs[1], widens, share))
     scenarios = tuple(
         with_numbers(run.scenario, numbers_in(run.measured.label, numbers, fitted.values)) for run in runs
     )
     faults = [text for text in dict.fromkeys(broken_rule(scenario.device) for scenario in scenarios) if text]
     if fitted.edge:
-        texts = {item.path: f"{item.value:.4g} {item.unit}".rstrip(" -") for item in estimates}
-        sides = {path: "above" if side > 0 else "below" for path, side in fitted.edge.items()}
-        wanted = " and ".join(f"{path} {sides[path]} {text}" for path, text in texts.items() if path in sides)
-        faults.append(f"the recordings favour {wanted}, where every run fails")
+        wanted = [
+            f"{item.path} {'above' if fitted.edge[item.path] > 0 else 'below'} "
+            f"{f'{item.value:.4g} {item.unit}'.rstrip(' -')}"
+            for item in estimates
+            if item.path in fitted.edge
+        ]
+        faults.append(f"the recordings favour {' and '.join(wanted)}, where every run fails")
     elif not fitted.has_converged:
         faults.append(f"the search stopped after {fitted.evaluations} runs before it converged")
+    covariance, recordings = fitted.covariance[np.ix_(rows, rows)], count_of(len(runs), "recording")
     tolerances = count_of(len(known), "tolerance")
     return TrajectoryFit(
         procedure="trajectory",
-        summary=f"{count_of(len(rows), 'number')} fitted to {count_of(len(runs), 'recording')}, {tolerances}",
-        kind=kind_of(recording.kind for recording in measurements),
+        summary=f"{count_of(len(rows), 'number')} fitted to {recordings}, {tolerances}",
+        estimates=tuple(estimates),
+        kind=kind_of(measured.kind for measured in measurements),
+        conflict=conflict,
+        remarks=(*outliers, *faults),
+        faults=tuple(faults),
         problem=problem,
-        numbers=numbers,
         fit=fitted,
-        estimates=estimates,
         covariance=covariance,
         correlation=covariance / np.outer(errors[rows], errors[rows]),
         known=tuple(known),
@@ -619,44 +558,33 @@ def _result(
         models=tuple(models),
         measurements=tuple(measurements),
         scenarios=scenarios,
-        conflict=conflict,
-        remarks=(*outliers, *faults),
-        faults=tuple(faults),
     )
 
 
-def _wandering(fitted: Fit, numbers: tuple[FitNumber, ...]) -> str:
+def _wandering(fitted: Fit) -> str:
     """Return a sentence on a channel whose residual drifts beyond the limit of its zero error; empty if none does.
 
     The zero error of a sensor stays within its limit, so a larger drift is due to the model.
     """
-    for number in (number for number in numbers if number.path.startswith(ZERO_OF)):
-        channel = number.path.removeprefix(ZERO_OF)
+    for number in (number for number in fitted.numbers if number.path.startswith(ZERO_OF)):
+        channel, unit = number.path.removeprefix(ZERO_OF), number.unit.removesuffix("_d")
         noise, limit = fitted.sensors.get(channel), math.sqrt(3.0) * number.deviation
         if noise is None or not math.isfinite(limit):
             continue
         wander = noise.deviation * math.sqrt(max(1.0 - noise.innovation**2, 0.0))
         if wander > limit:
-            shown, unit = in_shown_unit(wander, number.unit.removesuffix("_d"))
-            most, _ = in_shown_unit(limit, number.unit.removesuffix("_d"))
-            return (
-                f"the residual of {channel} drifts by {shown:.2g} {unit}, but the zero of its sensor by at most "
-                f"{most:.2g} {unit}"
-            )
+            drift, most = (shown_text(size, unit, digits=2) for size in (wander, limit))
+            return f"the residual of {channel} drifts by {drift}, but the zero of its sensor by at most {most}"
     return ""
 
 
 def _bursting(measurements: Sequence[Recording], models: Sequence[Recording]) -> str:
     """Return a sentence on a channel whose residuals are far above the noise that lasts; empty if there is none."""
-    for measured, model in zip(measurements, models, strict=True):
-        for name in (name for name in measured.names if name in model):
-            residuals = measured[name] - model[name]
-            size, noise = float(np.sqrt(np.mean(np.square(residuals)))), correlated_noise_of(residuals)
-            if size > _BURST * noise and size > _FELT * float(np.ptp(measured[name])):
-                return (
-                    f"the residual of {name} of {measured.label} is {size / max(noise, 1.0e-300):.0f} times the noise "
-                    "that lasts"
-                )
+    for measured, name, residuals in _residuals(measurements, models):
+        size, noise = float(np.sqrt(np.mean(np.square(residuals)))), correlated_noise_of(residuals)
+        if size > _BURST * noise and size > _FELT * float(np.ptp(measured[name])):
+            times = size / max(noise, 1.0e-300)
+            return f"the residual of {name} of {measured.label} is {times:.0f} times the noise that lasts"
     return ""
 
 
@@ -690,53 +618,84 @@ class ExpectedBenefit:
 
 
 def expected_information(fit: TrajectoryFit, candidates: Sequence[CandidateExperiment]) -> tuple[ExpectedBenefit, ...]:
-    """Return the expected benefit of each candidate experiment, the most informative first."""
-    benefits = [_benefit(fit, candidate) for candidate in candidates]
+    """Return the expected benefit of each candidate experiment, the most informative first.
+
+    The whitened Jacobian of a candidate is added to the information of the fit.
+    """
+    benefits, found, sensors = list[ExpectedBenefit](), fit.fit, fit.fit.sensors
+    # Another experiment says nothing of a number of one recording, such as its trigger.
+    common = [index for index, number in enumerate(found.numbers) if not number.recordings]
+    numbers, point = tuple(replace(found.numbers[index], base="") for index in common), found.values[common]
+    unknowns = [index for index, number in enumerate(found.numbers) if not number.is_tolerance]
+    # In units of today's standard errors, for pascals and radians differ by many powers of ten.
+    errors, rows = np.sqrt(np.diag(found.covariance)), np.ix_(unknowns, unknowns)
+    before = found.covariance / np.outer(errors, errors)
+    for candidate in candidates:
+        noise = dict(candidate.noise) or {name: model.deviation for name, model in sensors.items()}
+        count = math.floor(candidate.scenario.run.duration / candidate.interval + _FITS)
+        times = candidate.interval * np.arange(count + 1, dtype=np.float64)
+        samples = {name: Channel(np.zeros(times.size), CHANNELS[name].unit) for name in noise}
+        measured = Recording(candidate.label, times, samples)
+        start = numbers_in(candidate.label, numbers, point)
+        run = prepare_samples(candidate.scenario, measured, noise, reach_of(numbers), start)
+
+        def signals(points: Floats, run: PreparedExperiment = run) -> Floats:
+            (modelled,) = signals_of([run], numbers, points)
+            return np.concatenate([modelled[name] for name in run.measured.names])
+
+        runs = FitRuns(signals, numbers, (), report_nothing, 0, is_motion=True)
+        with refused_as(IdentificationError, f"candidate '{candidate.label}'", IdentificationError):
+            # As in the fit, a difference is as long as changes the samples by three units of noise in all.
+            runs.adapt_steps(runs.jacobian(point / runs.scale), 1.0 / np.repeat(list(noise.values()), times.size))
+            slopes = np.asarray(runs.jacobian(point / runs.scale) / runs.scale)
+        blocks = []
+        for block, (name, deviation) in zip(np.split(slopes, len(noise)), noise.items(), strict=True):
+            sensor = sensors.get(name)
+            blocks.append(whiten(block, replace(sensor, deviation=deviation) if sensor else Noise(deviation)))
+        jacobian, information = np.concatenate(blocks) * errors[common], np.linalg.inv(before)
+        information[np.ix_(common, common)] += jacobian.T @ jacobian
+        after = np.linalg.inv(information)
+        gain = 0.5 * float(np.linalg.slogdet(before[rows])[1] - np.linalg.slogdet(after[rows])[1])
+        shrinkage = {found.numbers[index].name: math.sqrt(max(after[index, index], 0.0)) for index in unknowns}
+        benefits.append(ExpectedBenefit(candidate.label, gain, shrinkage, min(shrinkage, key=shrinkage.__getitem__)))
     return tuple(sorted(benefits, key=lambda benefit: -benefit.gain))
 
 
-def _benefit(fit: TrajectoryFit, candidate: CandidateExperiment) -> ExpectedBenefit:
-    """Return the expected benefit of a candidate, from its whitened Jacobian added to the information of the fit."""
-    noise = dict(candidate.noise) or {name: model.deviation for name, model in fit.fit.sensors.items()}
-    # Another experiment says nothing of a number of one recording, such as its trigger.
-    common = [index for index, number in enumerate(fit.numbers) if not number.recordings]
-    slopes = _slopes(candidate, noise, [fit.numbers[index] for index in common], fit.fit.values[common])
-    blocks = []
-    for block, (name, deviation) in zip(np.split(slopes, len(noise)), noise.items(), strict=True):
-        sensor = fit.fit.sensors.get(name)
-        blocks.append(whiten(block, replace(sensor, deviation=deviation) if sensor else Noise(deviation)))
-    # In units of today's standard errors, for pascals and radians differ by many powers of ten.
-    errors = np.sqrt(np.diag(fit.fit.covariance))
-    jacobian = np.concatenate(blocks) * errors[common]
-    before = fit.fit.covariance / np.outer(errors, errors)
-    information = np.linalg.inv(before)
-    information[np.ix_(common, common)] += jacobian.T @ jacobian
-    after = np.linalg.inv(information)
-    unknowns = [index for index, number in enumerate(fit.numbers) if not number.is_tolerance]
-    shrinkage = {fit.numbers[index].name: math.sqrt(max(after[index, index], 0.0)) for index in unknowns}
-    rows = np.ix_(unknowns, unknowns)
-    gain = 0.5 * float(np.linalg.slogdet(before[rows])[1] - np.linalg.slogdet(after[rows])[1])
-    return ExpectedBenefit(candidate.label, gain, shrinkage, min(shrinkage, key=lambda name: shrinkage[name]))
+def solve_section(
+    section: TrajectorySection,
+    context: BenchContext,
+    reader: RecordingReader,
+    bench: Mapping[str, Estimate],
+    used: tuple[UsedRecording, ...],
+    report: Report,
+) -> TrajectoryFit:
+    """Solve section [trajectory]: fit the parameters and rank the candidates, after a check of all inputs.
 
-
-def _slopes(
-    candidate: CandidateExperiment, noise: Mapping[str, float], numbers: Sequence[FitNumber], point: Floats
-) -> Floats:
-    """Return the Jacobian [SI] (samples of all channels, numbers) of the samples of a candidate at a point [SI]."""
-    count = math.floor(candidate.scenario.run.duration / candidate.interval + _WHOLE)
-    times = candidate.interval * np.arange(count + 1, dtype=np.float64)
-    samples = {name: Channel(np.zeros(times.size), CHANNELS[name].unit) for name in noise}
-    values = numbers_in("", numbers, point)
-    measured = Recording(candidate.label, times, samples)
-    prepared = prepare_samples(candidate.scenario, measured, noise, reach_of(numbers), values)
-
-    def signals_of_points(points: Floats) -> Floats:
-        signals = signals_at(prepared, columns_in("", numbers, points), points.shape[1])
-        return np.concatenate([signals[name] for name in noise])
-
-    runs = FitRuns(signals_of_points, tuple(numbers), (), report_nothing, 0, is_motion=True)
-    with refused_as(IdentificationError, f"candidate '{candidate.label}'", IdentificationError):
-        # As in the fit, a difference is as long as changes the samples by three units of noise in all.
-        weight = 1.0 / np.repeat(list(noise.values()), times.size)
-        runs.adapt_steps(runs.jacobian(point / runs.scale), weight)
-        return np.asarray(runs.jacobian(point / runs.scale) / runs.scale)
+    ``bench`` are estimates of bench procedures by path, ``used`` the recordings from which these were obtained.
+    """
+    try:
+        problem, candidates = problem_of(section, context, reader, bench, used), list[CandidateExperiment]()
+        for one in section.candidates:
+            scenario = scenario_named(one.scenario, one.overrides, context, reader.folder)
+            if one.interval > (longest := scenario.run.duration):
+                raise IdentificationError(
+                    f"candidate '{one.label}': interval = {one.interval:g} s must be at most {longest:g} s"
+                )
+            candidates.append(CandidateExperiment(one.label, scenario, one.noise.by_channel(), one.interval))
+        fitted = fit(problem, report)
+        expected = expected_information(fitted, candidates)
+    except (IdentificationError, DataError) as error:
+        if str(error).startswith(context.label):
+            raise
+        raise type(error)(f"{context.label}: {error}") from error
+    sources = tuple(RecordingSource(experiment.recording, experiment.source) for experiment in problem.experiments)
+    remarks = [*remarks_on_readings(sources), *fitted.remarks]
+    for item in fitted.estimates:
+        known = bench.get(item.path)
+        if known is None or not (known.is_usable and item.is_usable):
+            continue
+        if item.low > known.high or item.high < known.low:
+            ends = [in_shown_unit(number, item.unit) for number in (item.low, item.high, known.low, known.high)]
+            low, high, lowest, highest = (f"{end:.4g}" for end, _ in ends)
+            remarks.append(f"{item.path}: fitted {low} to {high} {ends[0][1]}, bench procedure {lowest} to {highest}")
+    return replace(fitted, expected=expected, remarks=tuple(remarks))

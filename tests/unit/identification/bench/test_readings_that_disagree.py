@@ -61,7 +61,7 @@ def test_a_repetition_of_another_gain_or_zero_is_named_and_not_weighed_out(
     own = source.recording["repetition"] == 2.0
     torque[own] = 1.03 * torque[own] if fault == "gain" else torque[own] + 0.1
     result = solved["static"]((changed(source, "torque", torque),))
-    assert result.conflict.startswith("repetition 2, fitted alone, gives different values")
+    assert result.conflict.startswith("repetition 2, fitted alone, would have other values")
     assert not any(item.is_identified for item in result.estimates)
 
 
@@ -73,7 +73,7 @@ def test_a_recording_of_another_gain_is_named_with_its_file(solved: dict[str, So
     wrong = changed(right[2], name, values[0] + 1.1 * (values - values[0]), "third.csv")
     assert solved[kind](right).conflict == ""
     assert solved[kind]((*right[:2], wrong)).conflict.startswith(
-        "recording 3 (third.csv), fitted alone, gives different values"
+        "recording 3 (third.csv), fitted alone, would have other values"
     )
 
 

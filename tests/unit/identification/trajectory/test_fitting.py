@@ -14,7 +14,6 @@ from ppafo.identification.trajectory.experiment import (
     FittedExperiment,
     TrajectoryProblem,
     number_at,
-    numbers_of,
     with_numbers,
 )
 from ppafo.identification.trajectory.fitting import FIT_TOLERANCE, TrajectoryFit, fit, prepare, run_with, signals_of
@@ -88,7 +87,7 @@ def test_an_estimate_is_found_by_the_short_path_of_the_valve(three: TrajectoryFi
 
 
 def test_columns_are_the_runs_that_simulate_makes_with_less_error(experiment: FittedExperiment) -> None:
-    numbers = numbers_of(TrajectoryProblem((INERTIA,), (experiment,)))
+    numbers = TrajectoryProblem((INERTIA,), (experiment,)).numbers
     prepared = prepare(experiment, {})
     (signals,) = signals_of([prepared], numbers, np.array([[0.010, 0.0084]]))
     assert run_with(prepared, {"foot_plate.inertia": 0.0084}).plant.inertia == 0.0084

@@ -10,7 +10,6 @@ from ppafo.identification.tolerances import Tolerances
 from ppafo.identification.trajectory.experiment import (
     FittedExperiment,
     TrajectoryProblem,
-    stated_by,
     tolerance_parameters,
 )
 from ppafo.identification.trajectory.fitting import TrajectoryFit, fit
@@ -24,8 +23,7 @@ LEAK = 0.3e-6
 
 
 def fitted(experiment: FittedExperiment, *sought: FitNumber) -> TrajectoryFit:
-    stated = stated_by(load_parameter_set("ppafo2011"), experiment.scenario)
-    tolerances = tolerance_parameters(Tolerances(), (experiment,), sought, stated)
+    tolerances = tolerance_parameters(Tolerances(), (experiment,), sought, load_parameter_set("ppafo2011"))
     return fit(TrajectoryProblem((*sought, *tolerances), (experiment,)))
 
 

@@ -13,7 +13,6 @@ from ppafo.identification.trajectory.experiment import (
     declared_numbers,
     full_path,
     number_at,
-    numbers_of,
     with_numbers,
 )
 from ppafo.identification.trajectory.fitting import fit, prepare, signals_of
@@ -28,9 +27,8 @@ def problem(experiment: FittedExperiment, *parameters: FitNumber) -> TrajectoryP
 
 
 def test_bounds_and_scale_follow_from_the_declaration(experiment: FittedExperiment) -> None:
-    inertia, friction, angle = numbers_of(
-        problem(experiment, INERTIA, FitNumber("friction.static_torque"), FitNumber("motion.angle"))
-    )
+    sought = INERTIA, FitNumber("friction.static_torque"), FitNumber("motion.angle")
+    inertia, friction, angle = problem(experiment, *sought).numbers
     assert (inertia.scale, inertia.low, inertia.high) == pytest.approx((8.4e-3, 8.4e-5, 0.84))
     assert (friction.low, friction.unit) == (pytest.approx(0.0045), "N m")
     assert (angle.low, angle.unit) == (-10.0, "rad")
@@ -95,7 +93,7 @@ def test_samples_off_the_grid_lie_between_two_records(experiment: FittedExperime
 def test_the_initial_state_is_that_in_which_the_samples_up_to_the_start_end(experiment: FittedExperiment) -> None:
     clean = simulate(experiment.scenario).recording
     shifted = dataclasses.replace(clean, time=clean.time - 0.01)
-    prepared = prepare(dataclasses.replace(experiment, recording=shifted, initial_state="recording"), {})
+    prepared = prepare(dataclasses.replace(experiment, recording=shifted, is_recorded_start=True), {})
     before = shifted.time <= 1e-9
     assert before.sum() == 11
     assert prepared.scenario.initial.pressure_1 == pytest.approx(float(clean["pressure_1"][before][-1]), rel=1e-3)

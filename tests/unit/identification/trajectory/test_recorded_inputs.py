@@ -12,7 +12,6 @@ from ppafo.identification.tolerances import DEFAULTS
 from ppafo.identification.trajectory.experiment import (
     FittedExperiment,
     TrajectoryProblem,
-    numbers_of,
     tolerance_parameters,
 )
 from ppafo.identification.trajectory.fitting import fit, prepare, signals_at, signals_of
@@ -63,7 +62,7 @@ def test_a_recorded_command_gives_the_run_that_the_controller_made(
     begun = dataclasses.replace(scenario, motion=state[0], initial=state[1])
     start = float(recording.time[at])
     followed = FittedExperiment("task", begun, recording, start=start, noise=NOISE, inputs=("command",))
-    numbers = numbers_of(TrajectoryProblem((FitNumber("valve.discharge_coefficient"),), (followed,)))
+    numbers = TrajectoryProblem((FitNumber("valve.discharge_coefficient"),), (followed,)).numbers
     (signals,) = signals_of([prepare(followed, {})], numbers, np.array([[numbers[0].start]]))
     assert signals["angle"][:, 0] == pytest.approx(recording["angle"][at:], abs=1e-5)
     assert signals["pressure_1"][:, 0] == pytest.approx(recording["pressure_1"][at:], rel=1e-5)
@@ -72,7 +71,7 @@ def test_a_recorded_command_gives_the_run_that_the_controller_made(
 def test_forty_runs_follow_the_same_command_as_one(controlled: tuple[Scenario, Recording]) -> None:
     scenario, recording = controlled
     followed = FittedExperiment("task", scenario, recording, noise=NOISE, inputs=("command",))
-    numbers, prepared = numbers_of(TrajectoryProblem((FLOW,), (followed,))), [prepare(followed, {})]
+    numbers, prepared = TrajectoryProblem((FLOW,), (followed,)).numbers, [prepare(followed, {})]
     points = np.linspace(0.10, 0.12, 40)[None, :]
     (many,) = signals_of(prepared, numbers, points)
     (last,) = signals_of(prepared, numbers, points[:, -1:])
@@ -183,9 +182,7 @@ def test_a_recording_that_begins_in_motion_gives_the_velocity_at_its_start(
     recording = experiment.recording
     speed = np.gradient(recording["angle"], recording.time)
     start = float(recording.time[int(np.argmax(speed > 0.5 * speed.max())) + 5])
-    cut = dataclasses.replace(
-        experiment, recording=recording.between(start, 0.35), start=start, initial_state="recording"
-    )
+    cut = dataclasses.replace(experiment, recording=recording.between(start, 0.35), start=start, is_recorded_start=True)
     sought = (FitNumber("foot_plate.inertia", off * 0.0084, 0.001, 0.1),)
     found = fit(TrajectoryProblem((*sought, *tolerance_parameters(DEFAULTS, [cut], sought)), (cut,)))
     (inertia,) = found.estimates

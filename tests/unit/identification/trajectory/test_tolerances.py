@@ -21,6 +21,7 @@ from ppafo.identification.trajectory.experiment import (
     with_numbers,
 )
 from ppafo.identification.trajectory.fitting import fit, prepare, signals_at
+from ppafo.parameters.loading import load_parameter_set
 from ppafo.parameters.records import checked_record, record_from
 from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording
@@ -74,7 +75,10 @@ def test_supplies_are_those_of_a_recording_and_zeros_and_gains_those_of_a_sensor
 
 
 def test_a_number_of_the_set_is_held_with_what_the_set_states_or_else_a_default(experiment: FittedExperiment) -> None:
-    found = tolerance_parameters(Tolerances(), (experiment,), (), {"actuator.torque_constant": 1.0e-6})
+    whole = load_parameter_set("ppafo2011")
+    entry = replace(whole.numbers["actuator.torque_constant"], value=14.51e-6, unit="m^3", uncertainty=1.0e-6)
+    known = replace(whole, numbers={"actuator.torque_constant": entry})
+    found = tolerance_parameters(Tolerances(), (experiment,), (), known)
     deviations = {item.path: item.deviation for item in found}
     assert deviations["actuator.torque_constant"] == pytest.approx(1.0e-6 / 1.96, rel=1e-3)
     assert deviations["foot_plate.inertia"] == pytest.approx(0.05 * 0.0084 / math.sqrt(3.0))
@@ -106,7 +110,7 @@ def test_friction_at_rest_may_last_in_a_motion_up_to_a_velocity_where_the_set_sa
 
 
 def test_a_start_read_from_noisy_samples_is_known_to_their_noise(experiment: FittedExperiment) -> None:
-    inside = replace(experiment, start=0.05, initial_state="recording")
+    inside = replace(experiment, start=0.05, is_recorded_start=True)
     deviations = {item.path: item.deviation for item in tolerance_parameters(Tolerances(), (inside,), ())}
     assert deviations["motion.angle"] == pytest.approx(math.radians(math.hypot(0.05, 0.1)), rel=0.1)
     assert deviations["initial.pressure_1"] == pytest.approx(500.0, rel=0.2)
