@@ -24,7 +24,7 @@ if not __package__:
     sys.path[0] = str(Path(__file__).parents[1])
 
 from ppafo.constants import PASCALS_PER_PSI
-from ppafo.identification.least_squares import FitNumber
+from ppafo.identification.fit import FitNumber
 from ppafo.identification.tolerances import Tolerances
 from ppafo.identification.trajectory.experiment import (
     FITTED_CHANNELS,

@@ -143,7 +143,6 @@ class Identification:
             "confidence": fit.problem.confidence,
             **fields_of(fit.fit, "evaluations", "has_converged"),
             "covariance": fit.covariance.tolist(),
-            "correlation": fit.correlation.tolist(),
             "tolerances": [plain(tolerance) for tolerance in fit.known],
             "channels": [plain(channel) for channel in fit.channels],
             "conflict": None if fit.fit.conflict is None else plain(fit.fit.conflict),

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.fit import Fit, fit
-from ppafo.identification.least_squares import FitNumber, ResidualBlock
+from ppafo.identification.fit import Fit, FitNumber, ResidualBlock, fit
 from ppafo.identification.noise import Noise, burg, noise_of, whiten
 from ppafo.signals.recording import Floats
 

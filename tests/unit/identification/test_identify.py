@@ -215,7 +215,7 @@ def test_two_parts_of_one_recording_are_not_the_same_samples_twice(solved: Solve
 def test_a_set_says_from_which_recordings_and_on_which_set_it_was_made(solved: Solve, bench: Path) -> None:
     made = solved(STATIC).new_set.parameter_set
     before = load_parameter_set("ppafo2011").title
-    assert made.title == f"{before}, identified on ppafo2011 from static.csv"
+    assert made.title == f"{before}, identified on ppafo2011 from 1 recording"
     assert "come from the problem 'twin', on the set 'ppafo2011' from synthetic recordings: static.csv; " in made.notes
     text = (bench / "static.csv").read_text()
     (bench / "static.csv").write_text("".join(line for line in text.splitlines(True) if line[0] != "#"))

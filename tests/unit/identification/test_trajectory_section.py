@@ -159,7 +159,7 @@ def test_the_document_has_all_that_the_fit_says(both: Identification) -> None:
     document = json.loads(json.dumps(both.json_document()))["trajectory"]
     assert document["recordings_are"] == "synthetic"
     assert [item["inputs"] for item in document["recordings"]] == [[], ["command", "supply_pressure"]]
-    assert np.array(document["covariance"]).shape == np.array(document["correlation"]).shape == (2, 2)
+    assert np.array(document["covariance"]).shape == (2, 2)
     assert len(document["channels"]) == 6
     assert document["next_experiments"][0]["label"] == "slow"
     assert document["next_experiments"][0]["gain"] > 0.0
@@ -234,7 +234,7 @@ def test_the_interval_of_the_bench_can_be_the_prior_of_the_fit(solve: Solve) -> 
     outcome = solve(STATIC + FIT + prior)
     assert outcome.trajectory is not None
     known = outcome.results[0]["friction.static_torque"]
-    given = next(one for one in outcome.trajectory.numbers if one.path == "friction.static_torque")
+    given = next(one for one in outcome.trajectory.fit.numbers if one.path == "friction.static_torque")
     assert given.start == known.value
     assert given.deviation == pytest.approx(known.half_width / 1.96, rel=1e-2)
     with pytest.raises(PpafoError, match="prior = 'bench' needs a value that a procedure of this problem identifies"):

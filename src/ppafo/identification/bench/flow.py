@@ -44,8 +44,7 @@ from ppafo.identification.bench.readings import (
     check_sources,
     meter_readings,
 )
-from ppafo.identification.fit import Fit
-from ppafo.identification.least_squares import FitNumber, Flags
+from ppafo.identification.fit import Fit, FitNumber, Flags
 from ppafo.identification.source import RecordingSource, Sources, pool
 from ppafo.identification.tolerances import GAS_LAW as LIMIT_OF_GAS_LAW
 from ppafo.identification.tolerances import Tolerances

@@ -38,7 +38,7 @@ from ppafo.identification.bench.readings import (
     check_sources,
     without_wrong_samples,
 )
-from ppafo.identification.least_squares import FitNumber
+from ppafo.identification.fit import FitNumber
 from ppafo.identification.source import RecordingSource, Sources, window
 from ppafo.model.declaration import Number
 from ppafo.parameters.records import keyed

@@ -8,7 +8,7 @@ from typing import NoReturn
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.least_squares import Flags
+from ppafo.identification.fit import Flags
 from ppafo.identification.source import RecordingSource, Sources, pool, window
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.faults import longest_gap, noise_of, outlying_samples, plateaus, resolution_of

@@ -39,7 +39,7 @@ from ppafo.identification.bench.readings import (
     check_sources,
 )
 from ppafo.identification.estimate import in_shown_unit
-from ppafo.identification.least_squares import Flags
+from ppafo.identification.fit import Flags
 from ppafo.identification.source import RecordingSource, Sources, pool
 from ppafo.report.kind import Kind
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals

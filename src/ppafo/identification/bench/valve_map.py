@@ -30,8 +30,7 @@ from ppafo.identification.bench.law import (
 )
 from ppafo.identification.bench.readings import check_no_wrong_reading, check_sources, meter_readings
 from ppafo.identification.estimate import Verdict
-from ppafo.identification.fit import SHAPE, other_shape
-from ppafo.identification.least_squares import FitNumber
+from ppafo.identification.fit import SHAPE, FitNumber, other_shape
 from ppafo.identification.source import RecordingSource, Sources, pool
 from ppafo.model.effects.kind import SECTION
 from ppafo.model.effects.opening import NODES

@@ -59,8 +59,7 @@ from ppafo.identification.bench.readings import (
     without_wrong_samples,
 )
 from ppafo.identification.estimate import in_shown_unit, interval_texts
-from ppafo.identification.fit import Fit
-from ppafo.identification.least_squares import FitNumber
+from ppafo.identification.fit import Fit, FitNumber
 from ppafo.identification.source import RecordingSource, Sources, window
 from ppafo.model.declaration import Number
 from ppafo.parameters.device import VANE

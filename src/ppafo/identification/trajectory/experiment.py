@@ -11,7 +11,7 @@ import numpy as np
 from ppafo.errors import IdentificationError, PpafoError, ScenarioError, UnitError, noted_in, raise_noted, refused_as
 from ppafo.identification.bench.law import BenchContext
 from ppafo.identification.estimate import Estimate, interval_factor
-from ppafo.identification.least_squares import FitNumber
+from ppafo.identification.fit import FitNumber
 from ppafo.identification.new_set import fitting_unit, stated_half_width
 from ppafo.identification.source import RecordingReader, UsedRecording, double_use
 from ppafo.identification.tolerances import Tolerances

@@ -23,9 +23,8 @@ from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import DataError, IdentificationError, refused_as
 from ppafo.identification.bench.law import BenchContext
 from ppafo.identification.estimate import Estimate, Identified, in_shown_unit, shown_text
-from ppafo.identification.fit import Fit, conflict_in_words, estimate_of
+from ppafo.identification.fit import Fit, FitNumber, FitRuns, ResidualBlock, conflict_in_words, estimate_of
 from ppafo.identification.fit import fit as fit_residuals
-from ppafo.identification.least_squares import FitNumber, FitRuns, ResidualBlock
 from ppafo.identification.noise import Noise, whiten
 from ppafo.identification.problem import TrajectorySection
 from ppafo.identification.source import RecordingReader, RecordingSource, UsedRecording, kind_of, remarks_on_readings
@@ -372,7 +371,7 @@ class NuisanceParameter:
 class TrajectoryFit(Identified):
     """Result of a trajectory fit: estimates of the unknowns, and the updated tolerances (``known``).
 
-    ``covariance`` [SI] and ``correlation`` are in the order of ``estimates``. ``channels`` are residual statistics.
+    ``covariance`` [SI] is in the order of ``estimates``. ``channels`` are residual statistics.
     ``models`` are the fitted runs at the sample times and ``measurements`` the samples, both by experiment with the
     time of the run. ``scenarios`` have the fitted values. ``expected`` has the benefit of candidates, best first.
     """
@@ -380,7 +379,6 @@ class TrajectoryFit(Identified):
     problem: TrajectoryProblem
     fit: Fit
     covariance: Floats
-    correlation: Floats
     known: tuple[NuisanceParameter, ...]
     channels: tuple[ChannelFit, ...]
     models: tuple[Recording, ...]
@@ -539,8 +537,7 @@ def _result(
         faults.append(f"the recordings favour {' and '.join(wanted)}, where every run fails")
     elif not fitted.has_converged:
         faults.append(f"the search stopped after {fitted.evaluations} runs before it converged")
-    covariance, recordings = fitted.covariance[np.ix_(rows, rows)], count_of(len(runs), "recording")
-    tolerances = count_of(len(known), "tolerance")
+    recordings, tolerances = count_of(len(runs), "recording"), count_of(len(known), "tolerance")
     return TrajectoryFit(
         procedure="trajectory",
         summary=f"{count_of(len(rows), 'number')} fitted to {recordings}, {tolerances}",
@@ -551,8 +548,7 @@ def _result(
         faults=tuple(faults),
         problem=problem,
         fit=fitted,
-        covariance=covariance,
-        correlation=covariance / np.outer(errors[rows], errors[rows]),
+        covariance=fitted.covariance[np.ix_(rows, rows)],
         known=tuple(known),
         channels=tuple(channels),
         models=tuple(models),

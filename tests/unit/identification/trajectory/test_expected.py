@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from ppafo.identification.least_squares import FitNumber
+from ppafo.identification.fit import FitNumber
 from ppafo.identification.trajectory.experiment import FittedExperiment, TrajectoryProblem
 from ppafo.identification.trajectory.fitting import CandidateExperiment, TrajectoryFit, expected_information, fit
 from ppafo.simulation.loading import load_scenario

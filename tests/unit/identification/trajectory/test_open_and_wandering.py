@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from ppafo.identification.least_squares import FitNumber
+from ppafo.identification.fit import FitNumber
 from ppafo.identification.tolerances import Tolerances
 from ppafo.identification.trajectory.experiment import (
     FittedExperiment,

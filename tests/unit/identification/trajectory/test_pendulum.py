@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.least_squares import FitNumber
+from ppafo.identification.fit import FitNumber
 from ppafo.identification.tolerances import Tolerances
 from ppafo.identification.trajectory.experiment import (
     FittedExperiment,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError, IdentificationError
-from ppafo.identification.least_squares import FitNumber
+from ppafo.identification.fit import FitNumber
 from ppafo.identification.tolerances import DEFAULTS
 from ppafo.identification.trajectory.experiment import (
     FittedExperiment,

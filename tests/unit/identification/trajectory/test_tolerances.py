@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import IdentificationError
-from ppafo.identification.least_squares import FitNumber
+from ppafo.identification.fit import FitNumber
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.identification.trajectory import fitting as trajectory_runs
 from ppafo.identification.trajectory.experiment import (
