@@ -13,16 +13,24 @@ from ppafo.documents.toml_text import TomlKind, label, quote
 from ppafo.errors import IdentificationError
 from ppafo.identification.procedures import BenchProblem
 from ppafo.identification.tolerances import Columns, Confidence, Tolerances
-from ppafo.identification.trajectory.experiment import ALL_INPUTS
 from ppafo.model.declaration import Number
 from ppafo.parameters.declared import SHORT_NAME, Words
 from ppafo.parameters.parameter_set import Citation
 from ppafo.parameters.records import SchemaVersion, checked_record, keyed, record_schema
-from ppafo.simulation.recorded.channels import LONGEST_STEP
+from ppafo.simulation.recorded.channels import (
+    ANGLE,
+    COMMAND,
+    DORSIFLEXION_SUPPLY,
+    EXTERNAL_TORQUE,
+    LONGEST_STEP,
+    SUPPLY,
+)
 from ppafo.storage.column_map import ColumnMap
 from ppafo.wording import known_names, nearest_name
 
 _Label = Annotated[str, Words("name of the experiment, also used in file names", pattern=SHORT_NAME)]
+ALL_INPUTS = (COMMAND, SUPPLY, EXTERNAL_TORQUE, DORSIFLEXION_SUPPLY, ANGLE)
+"""Recorded channels that may replace inputs of the scenario; a recorded angle is a prescribed motion."""
 SHORTEST_STEP = 1.0e-6
 """Shortest time step that a problem file may request [s]."""
 _FILE = TomlKind(

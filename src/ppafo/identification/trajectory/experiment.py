@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from ppafo.identification.bench.law import BenchContext
 from ppafo.identification.estimate import Estimate, interval_factor
 from ppafo.identification.fit import FitNumber
 from ppafo.identification.new_set import fitting_unit, stated_half_width
+from ppafo.identification.problem import ALL_INPUTS, ExperimentSection, ParameterSection, TrajectorySection
 from ppafo.identification.source import RecordingReader, UsedRecording, double_use
 from ppafo.identification.tolerances import Tolerances
 from ppafo.model.catalog import VALVES, find_effects
@@ -55,15 +55,10 @@ from ppafo.simulation.scenario import (
 from ppafo.units import parse_quantity
 from ppafo.wording import first_twice, known_names
 
-if TYPE_CHECKING:
-    from ppafo.identification.problem import ExperimentSection, ParameterSection, TrajectorySection
-
 FITTED_CHANNELS = ("angle", "pressure_1", "pressure_2")
 """Channels that a fit can compare with a recording [rad], [Pa], [Pa]."""
 INPUTS = (COMMAND, SUPPLY, EXTERNAL_TORQUE)
 """Recorded channels that drive a run without a scenario, sample by sample."""
-ALL_INPUTS = (*INPUTS, DORSIFLEXION_SUPPLY, ANGLE)
-"""Recorded channels that may replace inputs of the scenario; a recorded angle is a prescribed motion."""
 _FITS = 1.0e-6
 """Rounding tolerance [s] of sample times at the start of an experiment."""
 TIME_OFFSET = "recording.time_offset"
@@ -549,7 +544,7 @@ def _tolerance(
 
 
 def problem_of(
-    section: "TrajectorySection",
+    section: TrajectorySection,
     context: BenchContext,
     reader: RecordingReader,
     bench: Mapping[str, Estimate],
@@ -572,7 +567,7 @@ def problem_of(
     return TrajectoryProblem((*parameters, *tolerances), experiments, section.confidence, used)
 
 
-def _experiment(entry: "ExperimentSection", context: BenchContext, reader: RecordingReader) -> FittedExperiment:
+def _experiment(entry: ExperimentSection, context: BenchContext, reader: RecordingReader) -> FittedExperiment:
     """Convert a table of a section to an experiment: recording, and scenario that models it.
 
     Without a scenario the recorded inputs drive the run, from the first sample unless a start is given.
@@ -638,7 +633,7 @@ def scenario_named(name: str, overrides: tuple[str, ...], context: BenchContext,
 
 
 def _parameter(
-    entry: "ParameterSection", scenarios: Mapping[str, Scenario], label: str, bench: Mapping[str, Estimate]
+    entry: ParameterSection, scenarios: Mapping[str, Scenario], label: str, bench: Mapping[str, Estimate]
 ) -> FitNumber:
     """Convert a table of a section to a parameter to fit [SI]; ``scenarios`` are by label of the experiment."""
     scenario = next((scenarios[name] for name in entry.recordings if name in scenarios), None)
