@@ -9,7 +9,7 @@ from typing import Any
 
 from ppafo.arguments import checked
 from ppafo.documents.json_text import fields_of
-from ppafo.errors import ParameterError, at_fault, refused_as
+from ppafo.errors import ParameterError, refused_as
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
 from ppafo.parameters.audit import AuditFinding, changed_paths, findings_of
 from ppafo.parameters.audit.changes import changes
@@ -146,14 +146,15 @@ def audit(
     ['ideal-opening', 'flow-of-proportional', 'flow-of-solenoid']
     """
     name_plugins(plugins)
-    loaded = parameter_set if isinstance(parameter_set, ParameterSet) else load_parameter_set(parameter_set)
-    # An argument, or the key of the set.
-    with at_fault("parent"):
-        parent_set = set_or_load(loaded.parent or None if parent is None else parent)
-    return _finding_of([AuditedSet(loaded, parent_set, tuple(findings_of(loaded, parent_set)))], True)
+    return audited([parameter_set], parent)
 
 
-def audited(names: Sequence[str], parent: str | None, is_whole: bool, overrides: Sequence[str]) -> Finding[Any]:
+def audited(
+    names: Sequence[ParameterSet | str | Path],
+    parent: ParameterSet | str | Path | None = None,
+    is_whole: bool = True,
+    overrides: Sequence[str] = (),
+) -> Finding[Any]:
     """Return changes and findings of one set, or a table of several sets; not passed if a set has an error.
 
     If ``is_whole`` is false and a set has a parent or overrides, findings that concern no changed value are only
@@ -161,16 +162,11 @@ def audited(names: Sequence[str], parent: str | None, is_whole: bool, overrides:
     """
     sets = []
     for name in names:
-        loaded = apply_overrides(load_parameter_set(name), overrides)
-        with refused_as(
-            ParameterError, argument_text("parent") if parent else f"{loaded.file}: parent", ParameterError
-        ):
-            parent_set = set_or_load(parent or loaded.parent or None)
+        loaded = apply_overrides(name if isinstance(name, ParameterSet) else load_parameter_set(name), overrides)
+        place = f"{loaded.file}: parent" if parent is None else argument_text("parent")
+        with refused_as(ParameterError, place, ParameterError):
+            parent_set = set_or_load(loaded.parent or None if parent is None else parent)
         sets.append(AuditedSet(loaded, parent_set, tuple(findings_of(loaded, parent_set)), tuple(overrides)))
-    return _finding_of(sets, is_whole)
-
-
-def _finding_of(sets: Sequence[AuditedSet], is_whole: bool) -> Finding[Any]:
     first, is_single = sets[0], len(sets) == 1
     if is_single:
         compares = first.parent is not None or bool(first.overrides)

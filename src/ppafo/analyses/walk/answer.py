@@ -1,7 +1,7 @@
 """Report of a walk of one wearer with and without the device: text, tables and figures."""
 
 import platform
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -16,6 +16,7 @@ from ppafo.parameters.reach import torque_reach
 from ppafo.remedy_trials import verdict_of
 from ppafo.report.finding import Column, Finding, Section, columns_of, facts
 from ppafo.report.kind import Kind
+from ppafo.signals.recording import Floats
 from ppafo.simulation.gains import gains_of
 from ppafo.simulation.numbers import changes_in, declared_numbers
 from ppafo.simulation.scenario import UNITS, Scenario
@@ -131,8 +132,6 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
     mended = usage_text(reloaded(scenario, verdict.mended)) if verdict.mended else ""
     supply, bottle, pictures = worn.supply, list[Section](), list[Section]()
     remarks = [*person_remarks(scenario)]
-    if supply and worn.status.is_completed:
-        remarks.append(f"bottle {supply.supply.bottle.label}: {supply.ending.message}")
     pressures = scenario.device.supply.pressure, scenario.device.supply.dorsiflexion_pressure
     for number, pressure in enumerate(pressures, 1):
         channel = f"pressure_{number}"
@@ -474,12 +473,8 @@ def mean_stride_csv(result: WalkResult) -> bytes:
     return _csv(columns)
 
 
-def _csv(columns: Mapping[str, Iterable[Any]]) -> bytes:
-    """Return simulated columns as CSV; a missing value is an empty cell."""
-    lists = (values.tolist() if isinstance(values, np.ndarray) else values for values in columns.values())
-    rows = (
-        ",".join("" if value is None else value if isinstance(value, str) else repr(value) for value in row)
-        for row in zip(*lists, strict=True)
-    )
+def _csv(columns: Mapping[str, Floats]) -> bytes:
+    """Return simulated columns as CSV."""
+    rows = (",".join(map(repr, row)) for row in zip(*(values.tolist() for values in columns.values()), strict=True))
     lines = ["# simulated: a model's own output, not measured", ",".join(columns), *rows]
     return ("\n".join(lines) + "\n").encode()
