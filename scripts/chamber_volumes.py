@@ -10,8 +10,12 @@ of figure 7, and how many of the six fitted rows of ``ppafo reproduce`` are met.
 
 import argparse
 
-from ppafo.analyses.reproduce.step_response import step_events, step_observations
-from ppafo.analyses.reproduce.torque_task import phased_runs, torque_task_claims, torque_task_observations
+from ppafo.analyses.reproduce.paper import (
+    phased_runs,
+    step_observations,
+    torque_task_claims,
+    torque_task_observations,
+)
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
 
@@ -26,14 +30,15 @@ def row(dead: float, displacement: float | None) -> str:
     names = ("step-response", "torque-task-solenoid", "torque-task-proportional")
     step, solenoid, proportional = (simulate(load_scenario(name, overrides)) for name in names)
     supply = step.scenario.device.supply
-    told = step_observations(step.recording, supply, step_events(step.recording))
+    told = step_observations(step.recording, supply)
     swings = torque_task_observations(solenoid, proportional)
     claims = torque_task_claims(*phased_runs(solenoid), proportional, ())
     met = [not claim.is_missed for claim in claims]
-    met += [all(seen.holds for seen in told), all(seen.holds for seen in swings)]
+    met += [all(seen.verdict != "undetermined" for seen in texts) for texts in (told, swings)]
     better, pair, spool, saved = (claim.found for claim in claims)
-    reserved = "; ".join(f"{seen.entry.id}: {seen.difference}" for seen in told if seen.holds and seen.difference)
-    shown = f"{sum(seen.holds for seen in told)} of {len(told)}{f' ({reserved})' if reserved else ''}"
+    held = [seen for seen in told if seen.verdict != "undetermined"]
+    reserved = "; ".join(f"{seen.entry.id}: {seen.note}" for seen in held if seen.note)
+    shown = f"{len(held)} of {len(told)}{f' ({reserved})' if reserved else ''}"
     return f"{dead:5g}  {better:18}  {pair:19}  {spool:6}  {saved:18}  {sum(met)} of {len(met)}  {shown}"
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from ppafo import plugins
-from ppafo.analyses.reproduce.solve import Reproduction, reproduce_paper
+from ppafo.analyses.reproduce.paper import Reproduction, reproduce_paper
 from ppafo.engine.cache import kept
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario

@@ -53,7 +53,7 @@ _HOMES = {
     "ppafo.analyses.endurance.discharge": ("Endurance",),
     "ppafo.analyses.endurance.question": ("bottle",),
     "ppafo.analyses.linearise.model": ("LinearModel",),
-    "ppafo.analyses.reproduce.solve": ("Reproduction",),
+    "ppafo.analyses.reproduce.paper": ("Reproduction",),
     "ppafo.analyses.sets.audit": ("audit",),
     "ppafo.analyses.study_results": ("StudyResults", "load_study_results"),
     "ppafo.analyses.sweep": ("sweep",),

@@ -11,8 +11,8 @@ from ppafo.analyses.identify import Identification as Identification
 from ppafo.analyses.identify import identify as identify
 from ppafo.analyses.linearise.model import LinearModel as LinearModel
 from ppafo.analyses.linearise.question import linearise as linearise
+from ppafo.analyses.reproduce.paper import Reproduction as Reproduction
 from ppafo.analyses.reproduce.question import reproduce as reproduce
-from ppafo.analyses.reproduce.solve import Reproduction as Reproduction
 from ppafo.analyses.sensitivity import sensitivity as sensitivity
 from ppafo.analyses.sets.audit import audit as audit
 from ppafo.analyses.study_results import StudyResults as StudyResults

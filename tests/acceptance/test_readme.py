@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.analyses.reproduce.answer import finding_of_studies
-from ppafo.analyses.reproduce.publication import Studies
+from ppafo.analyses.reproduce.claims import Studies
 from ppafo.analyses.reproduce.question import reproduce
+from ppafo.analyses.reproduce.report import finding_of_studies
 from ppafo.cli.commands import COMMANDS
 from ppafo.cli.main import build_parser, main
 from ppafo.report.finding import text_of

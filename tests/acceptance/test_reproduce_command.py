@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.analyses.reproduce import solve
-from ppafo.analyses.reproduce.claim import VERDICTS
-from ppafo.analyses.reproduce.solve import Reproduction
+from ppafo.analyses.reproduce import paper
+from ppafo.analyses.reproduce.claims import VERDICTS
+from ppafo.analyses.reproduce.paper import Reproduction
 from ppafo.cli.main import main
 from ppafo.progress import Report
 from ppafo.storage import read_csv
@@ -99,7 +99,7 @@ def test_a_missed_window_is_named_and_fails_unless_values_were_changed(
     def missing(overrides: Sequence[str], _report: Report) -> Reproduction:
         return dataclasses.replace(reproduction, claims=claims, overrides=tuple(overrides))
 
-    monkeypatch.setattr(solve, "reproduce_paper", missing)
+    monkeypatch.setattr(paper, "reproduce_paper", missing)
     assert main(["reproduce"]) == 1
     assert "missed: co2_solenoid is outside 1 to 1.2 g" in capsys.readouterr().out
     changed = ["--set", "valves.solenoid.area=31.6 mm^2"]

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from ppafo.analyses.design.problem import load_design
-from ppafo.analyses.reproduce.publication import load_publication
+from ppafo.analyses.reproduce.claims import load_publication
 from ppafo.analyses.tuning import load_tuning
 from ppafo.cli.doctor import FORMATS
 from ppafo.documents.json_text import MAXIMUM_LEVELS, is_nested_too_deeply, json_document

@@ -13,11 +13,11 @@ from pathlib import Path
 import pytest
 
 from ppafo.analyses.linearise.model import EQUILIBRIUM
-from ppafo.analyses.reproduce.publication import SEED
 from ppafo.cli import output
 from ppafo.cli.command_line import Command, CommandGroup, option_of, parameters_of
 from ppafo.cli.commands import COMMANDS, OTHERS
 from ppafo.cli.main import build_parser, main
+from ppafo.parameters.publications.publication import PAPER
 from ppafo.validation.settings import DEFAULT_LIMIT
 from tests.page_code import block_with, write_package
 
@@ -45,7 +45,7 @@ def test_defaults_that_are_written_in_a_signature_are_those_of_the_modules() -> 
     defaults = {
         "validate longest_delay": DEFAULT_LIMIT,
         "linearise at": EQUILIBRIUM,
-        "reproduce study": SEED,
+        "reproduce study": PAPER,
     }
     for words, value in defaults.items():
         name, argument = words.split()

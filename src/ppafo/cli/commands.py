@@ -25,8 +25,8 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
         "reproduce": Command(
             f"{_ANALYSES}.reproduce.question:reproduce",
             first_line="Reproduce the paper's experiments and check its claims.",
-            library="ppafo.analyses.reproduce.publication:FILE",
-            listing="ppafo.analyses.reproduce.publication:list_studies",
+            library="ppafo.analyses.reproduce.claims:FILE",
+            listing="ppafo.analyses.reproduce.claims:list_studies",
         ),
     },
     "your device": {

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.analyses.reproduce.publication import COMPUTATIONS, Studies, judge, load_publication
+from ppafo.analyses.reproduce.claims import COMPUTATIONS, Studies, judge, load_publication
 from ppafo.analyses.reproduce.question import reproduce
 from ppafo.cli.main import main
 from ppafo.errors import ScenarioError
@@ -49,22 +49,22 @@ def studied(folder: Path, text: str) -> Studies:
 
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_a_shipped_publication_states_only_numbers_that_were_read(name: str) -> None:
-    claims = [claim.entry for claim in load_publication(name).claims]
+    claims = [claim.entry for claim in load_publication(name)]
     stated = {claim.published: claim.unit for claim in claims if claim.published is not None}
     assert stated == PUBLISHED[name]
     assert all(
-        claim.entry.assumed or claim.entry.computation in ("held_torque", "") for claim in load_publication(name).claims
+        claim.entry.assumed or claim.entry.computation in ("held_torque", "") for claim in load_publication(name)
     )
 
 
 def test_every_computation_is_used_by_a_shipped_claim() -> None:
-    used = {claim.entry.computation for name in PUBLISHED for claim in load_publication(name).claims}
+    used = {claim.entry.computation for name in PUBLISHED for claim in load_publication(name)}
     assert set(FILE.names()) == {*PUBLISHED, PAPER}
     assert used - {""} == set(COMPUTATIONS)
 
 
 def test_the_torque_at_rest_is_the_measured_slope_times_the_pressure(tmp_path: Path) -> None:
-    (claim,) = studied(tmp_path, TEXT).studies[0].claims
+    (claim,) = studied(tmp_path, TEXT).claims
     assert claim.value == pytest.approx(1.451e-5 * 90.0 * 6894.757, rel=1e-6)
     assert claim.verdict == "consistent"
 
@@ -91,11 +91,11 @@ def test_a_claim_is_judged_by_the_range_that_its_file_gives(
     text = TEXT
     for old, new in zip(change[::2], change[1::2], strict=True):
         text = text.replace(old, new)
-    assert studied(tmp_path, text).studies[0].claims[0].verdict == verdict
+    assert studied(tmp_path, text).claims[0].verdict == verdict
 
 
 def test_the_ankle_moment_that_the_torque_is_a_share_of_is_that_of_the_gait() -> None:
-    (claim,) = (item for item in load_publication("jmd-2016").claims if item.entry.id == "share_of_healthy_torque")
+    (claim,) = (item for item in load_publication("jmd-2016") if item.entry.id == "share_of_healthy_torque")
     share = judge(claim).value
     assert share is not None
     moment = 1.451e-5 * 120.0 * 6894.757 / (share / 100.0)

@@ -1,20 +1,19 @@
 """The claims as a table, figures 7 and 8, and the page around them."""
 
+import dataclasses
 import html
 import re
 
 import pytest
 
-from ppafo.analyses.reproduce.answer import (
+from ppafo.analyses.reproduce.paper import Reproduction, holding_torque
+from ppafo.analyses.reproduce.report import (
     IDENTIFICATION_FIGURE,
     STEP_FIGURE,
     TORQUE_FIGURE,
+    finding_of,
     reproduction_page,
 )
-from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
-from ppafo.analyses.reproduce.solve import Reproduction
-from ppafo.analyses.reproduce.torque_task import holding_torque
-from ppafo.report.style import drawn_at
 from ppafo.report.writing import typeset
 from tests.unit.report.test_width_of_figures import texts_of
 
@@ -32,7 +31,7 @@ def words(page: str) -> str:
 
 
 def test_figure_7_has_the_four_panels_of_the_paper_in_its_units(reproduction: Reproduction) -> None:
-    figure = step_response_figure(reproduction.step.recording, 101325.0, reproduction.step_events)
+    figure = finding_of(dataclasses.replace(reproduction, synthetic="")).plot(STEP_FIGURE)
     assert [axes.get_ylabel() for axes in figure.axes] == [
         "Angle (deg)",
         "Difference (psi)",
@@ -47,7 +46,7 @@ def test_figure_7_has_the_four_panels_of_the_paper_in_its_units(reproduction: Re
 
 def test_figure_8_shows_torque_and_reference_of_both_valves_on_one_scale(reproduction: Reproduction) -> None:
     solenoid, proportional = reproduction.solenoid.recording, reproduction.proportional.recording
-    figure = torque_task_figure(solenoid, proportional, 5.0, (1.1, 0.4))
+    figure = finding_of(reproduction).plot(TORQUE_FIGURE)
     top, bottom = figure.axes[0], figure.axes[2]
     assert top.get_ylim() == bottom.get_ylim()
     for axes, recording in ((top, solenoid), (bottom, proportional)):
@@ -58,8 +57,7 @@ def test_figure_8_shows_torque_and_reference_of_both_valves_on_one_scale(reprodu
 
 def test_figure_8_states_where_the_gas_is_in_numbers_that_add_up(reproduction: Reproduction) -> None:
     recordings = reproduction.solenoid.recording, reproduction.proportional.recording
-    with drawn_at("84 mm"):
-        figure = torque_task_figure(*recordings, 5.0, (1.1, 0.4), recordings)
+    figure = finding_of(reproduction).plot(TORQUE_FIGURE, "84 mm")
     stated = [text.get_text() for text in figure.axes[-1].texts]
     for text, recording in zip(stated, recordings, strict=True):
         inside, vented = map(float, text.removesuffix(" g").split("+"))

@@ -35,7 +35,7 @@ def test_the_audit_takes_overrides_and_prints_json(capsys: pytest.CaptureFixture
         (["sets", "list"], "ppafo.parameters.load_parameter_set"),
         (["sets", "show", "ppafo2011"], "ppafo.parameters.load_parameter_set"),
         (["doctor", "--schema", "scenario"], "ppafo.loading.json_schema"),
-        (["reproduce"], "ppafo.analyses.reproduce.solve.reproduce_paper"),
+        (["reproduce"], "ppafo.analyses.reproduce.paper.reproduce_paper"),
         (["simulate", "step-response"], "ppafo.simulation.simulate.simulate"),
     ],
 )

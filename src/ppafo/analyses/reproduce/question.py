@@ -10,8 +10,8 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Progress, Report, report_nothing
 
 if TYPE_CHECKING:
-    from ppafo.analyses.reproduce.publication import Studies
-    from ppafo.analyses.reproduce.solve import Reproduction
+    from ppafo.analyses.reproduce.claims import Studies
+    from ppafo.analyses.reproduce.paper import Reproduction
     from ppafo.report.finding import Finding
 
 PublicationName = Annotated[str | Path, Word("NAME", option="--study")]
@@ -49,15 +49,15 @@ def reproduce(
     report = progress or report_nothing
     # Loading takes a second or two.
     report(Progress("loading the experiments"))
-    from ppafo.analyses.reproduce.answer import finding_of, finding_of_studies
-    from ppafo.analyses.reproduce.publication import ALL, SEED, Studies, check_study, run_studies
-    from ppafo.analyses.reproduce.solve import reproduce_paper
+    from ppafo.analyses.reproduce.claims import ALL, check_study, run_studies
+    from ppafo.analyses.reproduce.paper import reproduce_paper
+    from ppafo.analyses.reproduce.report import finding_of, finding_of_studies
+    from ppafo.parameters.publications.publication import PAPER
 
-    study = str(study)
     # Before anything runs, which takes long.
     changes = tuple(overrides)
-    check_study(study, changes)
-    if study == SEED:
+    study = check_study(study, changes)
+    if study == PAPER:
         return finding_of(reproduce_paper(changes, report))
-    seed = reproduce_paper((), report) if study == ALL else None
-    return finding_of_studies(Studies(run_studies(study, report), seed))
+    paper = reproduce_paper((), report).claims if study == ALL else ()
+    return finding_of_studies(run_studies(study, paper, report))
