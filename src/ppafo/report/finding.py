@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from ppafo.documents.json_text import json_text, plain
 from ppafo.errors import ArgumentError
 from ppafo.report.kind import PLAIN, ConfidenceInterval, Kind
-from ppafo.report.notebook import shown
 from ppafo.report.panels import Panel, draw_panels
-from ppafo.report.style import drawn_at, render_figure
+from ppafo.report.style import drawn_at, render_figure, shown
 from ppafo.report.writing import align_columns, inline_figure, render_page, terminal_width
 from ppafo.signals import RecordingKind
 from ppafo.units.shown import in_units, units_in_force

@@ -214,8 +214,7 @@ def metric_change(value: float, si_unit: str) -> tuple[float, str]:
 
 def metric_text(value: float, si_unit: str) -> str:
     """Format the value of a metric or channel, given in SI, as number and display unit."""
-    shown, unit = metric_level(value, si_unit)
-    return f"{without_exponent(shown, _METRIC)} {unit}".rstrip()
+    return of_stored_metric("", si_unit).text(value)
 
 
 def metrics_lines(metrics: Mapping[str, Metric]) -> list[str]:

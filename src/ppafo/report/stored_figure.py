@@ -15,9 +15,8 @@ from ppafo.errors import DataError, UnitError
 from ppafo.metrics.metric import Metric, Metrics
 from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.report.kind import metrics_lines
-from ppafo.report.notebook import shown
 from ppafo.report.recording_figure import recording_figure
-from ppafo.report.style import drawn_at
+from ppafo.report.style import drawn_at, shown
 from ppafo.signals import Recording
 from ppafo.storage import StoredResult, read_stored
 from ppafo.storage.result_folder import RUN_FILE

@@ -1,10 +1,10 @@
 """Common style of all figures: fonts, colours, sizes, grids of panels, and rendering to files."""
 
 import io
-import textwrap
 from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -167,6 +167,28 @@ def render_figure(figure: "Figure", file_formats: Iterable[str]) -> dict[str, by
     return files
 
 
+def png_of(figure: "Figure") -> bytes:
+    """Return a figure as PNG bytes, for a notebook."""
+    return render_figure(figure, ("png",))["png"]
+
+
+def shown(figure: "Figure") -> "Figure":
+    """Return the figure, prepared for display in a notebook with or without a backend, and for publishers."""
+    vars(figure).update(_repr_png_=partial(png_of, figure), savefig=partial(_save, figure))
+    return figure
+
+
+def _save(figure: "Figure", *arguments: Any, **options: Any) -> None:
+    """Save a figure as ``Figure.savefig`` does, with TrueType fonts: many publishers refuse Type 3 fonts.
+
+    The settings of Matplotlib, which other figures of the caller share, remain as they are.
+    """
+    import matplotlib
+
+    with matplotlib.rc_context({"pdf.fonttype": 42, "ps.fonttype": 42}):
+        type(figure).savefig(figure, *arguments, **options)
+
+
 def lay_out(figure: "Figure") -> None:
     """Compute the layout of a figure once, then fix it: resizing keeps the proportions."""
     layout = figure.get_layout_engine()
@@ -194,14 +216,3 @@ def mark_kind(figure: "Figure", kind: RecordingKind) -> None:
     inch = print_scale() / figure.get_figheight()
     size = font_size(9.0)
     figure.text(0.972, 1.0 - 0.12 * inch, kind, ha="right", va="top", color=GREY, fontsize=size, style="italic")
-
-
-def write_head(figure: "Figure", title: str, remark: str, kind: RecordingKind) -> None:
-    """Write title, grey remark below it, and kind of the numbers at the top of a figure without a layout engine."""
-    width, height = (length / print_scale() for length in figure.get_size_inches())
-    # About 15 letters of the remark go on an inch.
-    below = "\n".join(textwrap.wrap(remark, round(15.0 * width)))
-    for text, top, size, colour in ((title, 0.12, 11.0, BLACK), (below, 0.36, 9.0, GREY)):
-        style: dict[str, Any] = {"fontsize": font_size(size), "color": colour, "parse_math": False}
-        figure.text(0.12 / width, 1.0 - top / height, text, ha="left", va="top", **style)
-    mark_kind(figure, kind)

@@ -85,11 +85,6 @@ def quantity(value: float | None, unit: str, digits: int = 4) -> str:
     return f"{number} {'' if unit == '-' else unit}".rstrip()
 
 
-def format_reported_quantity(value: float, unit: str) -> str:
-    """Format a reported number with its unit, without adding digits."""
-    return f"{value:g} {'' if unit == '-' else unit}".rstrip()
-
-
 def terminal_width() -> int:
     """Return the number of characters in a line of the terminal; 0 where the output goes elsewhere."""
     return shutil.get_terminal_size().columns if sys.stdout is not None and sys.stdout.isatty() else 0

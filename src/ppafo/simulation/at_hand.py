@@ -1,5 +1,7 @@
 """Common interface of results with a recording: channels in any unit, tables, and display in a notebook."""
 
+import base64
+import html
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -52,8 +54,7 @@ class RecordedResult:
 
         ``width`` is the width in print, such as "84 mm", or a number [m]; by default 145 mm.
         """
-        from ppafo.report.notebook import shown
-        from ppafo.report.style import drawn_at
+        from ppafo.report.style import drawn_at, shown
 
         with drawn_at(width):
             return shown(self._figure())
@@ -75,9 +76,19 @@ class RecordedResult:
 
     @in_own_units
     def _repr_html_(self) -> str:
-        from ppafo.report.notebook import result_html
+        from ppafo.report.kind import metric_text, metric_words
+        from ppafo.report.style import png_of
 
-        return result_html(str(self).partition("\n")[0], self.metrics, self.plot())
+        head, rows = html.escape(str(self).partition("\n")[0]), []
+        for name, metric in self.metrics.items():
+            cells = (metric_words(name), metric_text(metric.value, metric.unit), metric.summary)
+            rows.append("".join(f'<td style="text-align: left">{html.escape(cell)}</td>' for cell in cells))
+        table = "".join(f"<tr>{row}</tr>" for row in rows)
+        picture = base64.b64encode(png_of(self.plot())).decode()
+        return (
+            f"<p><b>{head}</b></p><table>{table}</table>"
+            f'<img alt="{head}" style="max-width: 100%" src="data:image/png;base64,{picture}">'
+        )
 
     def dataset(self, units: Mapping[str, str] | None = None) -> "xarray.Dataset":
         """Return the recording as an xarray Dataset; attributes hold units, long names and the scenario as JSON.

@@ -11,19 +11,18 @@ import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.json_text import fields_of
-from ppafo.documents.toml_text import label
 from ppafo.errors import ScenarioError, SimulationError, UnitError, refused_as
 from ppafo.parameters import load_device
 from ppafo.parameters.publications.publication import FILE, PAPER, ClaimEntry, PublicationFile, read_publication
 from ppafo.progress import Progress, Report
-from ppafo.report.writing import format_reported_quantity, quantity
+from ppafo.report.writing import quantity
 from ppafo.units import from_si, parse_quantity
 from ppafo.version import __version__
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import healthy_metrics, walk
-from ppafo.wording import argument_text, known_names, nearest_name
+from ppafo.wording import known_names, nearest_name
 
 Verdict = Literal[
     "consistent", "inconsistent_as_reported", "met_by_fitted_settings", "plausible", "undetermined", "not_testable"
@@ -87,7 +86,7 @@ class Claim:
     def published(self) -> str:
         """Published value as displayed text with its direction; empty for a computation of our own."""
         entry = self.entry
-        number = "" if entry.published is None else format_reported_quantity(entry.published, entry.unit or "-")
+        number = "" if entry.published is None else f"{entry.published:g} {entry.unit.removeprefix('-')}".rstrip()
         return f"up to {number}" if number and entry.direction == "maximum" else entry.words or number
 
     @property
@@ -162,21 +161,6 @@ def list_studies() -> list[dict[str, Any]]:
     """Return name and title of every study."""
     words = {name: read_publication(name)[0].title for name in FILE.names()} | {ALL: "every study, one table"}
     return [{"name": name, "title": words[name]} for name in study_names()]
-
-
-def check_study(study: str | Path, overrides: Sequence[str]) -> str:
-    """Return the name of a study; ScenarioError if it is unknown, and for overrides with any study but the paper's."""
-    name = str(study)
-    if name not in study_names() and Path(study).suffix != ".toml":
-        raise ScenarioError(
-            f"there is no study '{label(name)}'{known_names(name, study_names())}, or give a .toml file"
-        )
-    if overrides and name != PAPER:
-        option, argument = argument_text("overrides", option="--set"), argument_text("study")
-        raise ScenarioError(
-            f"{option} {overrides[0]}: applies to the study '{PAPER}' only; omit {option} or {argument}"
-        )
-    return name
 
 
 def run_studies(study: str, of_paper: Sequence[Claim], report: Report) -> Studies:

@@ -49,15 +49,23 @@ def reproduce(
     report = progress or report_nothing
     # Loading takes a second or two.
     report(Progress("loading the experiments"))
-    from ppafo.analyses.reproduce.claims import ALL, check_study, run_studies
+    from ppafo.analyses.reproduce.claims import ALL, run_studies, study_names
     from ppafo.analyses.reproduce.paper import reproduce_paper
     from ppafo.analyses.reproduce.report import finding_of, finding_of_studies
+    from ppafo.documents.toml_text import label
+    from ppafo.errors import ScenarioError
     from ppafo.parameters.publications.publication import PAPER
+    from ppafo.wording import argument_text, known_names
 
-    # Before anything runs, which takes long.
-    changes = tuple(overrides)
-    study = check_study(study, changes)
-    if study == PAPER:
+    name, changes = str(study), tuple(overrides)
+    if name not in study_names() and Path(study).suffix != ".toml":
+        raise ScenarioError(
+            f"there is no study '{label(name)}'{known_names(name, study_names())}, or give a .toml file"
+        )
+    if changes and name != PAPER:
+        option, argument = argument_text("overrides", option="--set"), argument_text("study")
+        raise ScenarioError(f"{option} {changes[0]}: applies to the study '{PAPER}' only; omit {option} or {argument}")
+    if name == PAPER:
         return finding_of(reproduce_paper(changes, report))
-    paper = reproduce_paper((), report).claims if study == ALL else ()
-    return finding_of_studies(run_studies(study, paper, report))
+    paper = reproduce_paper((), report).claims if name == ALL else ()
+    return finding_of_studies(run_studies(name, paper, report))

@@ -1,11 +1,12 @@
 """Stick figures of the leg in a walk and in the healthy gait, and instants of a stride as single frames."""
 
+import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.report.style import GREY, font_size, house_style, print_scale, printed_width, write_head
+from ppafo.report.style import BLACK, GREY, font_size, house_style, mark_kind, print_scale, printed_width
 from ppafo.signals.recording import Floats
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
 from ppafo.walking.gait_series import Posture, ankle_path, gait_timing
@@ -102,9 +103,17 @@ def frames_figure(comparison: WalkComparison) -> "Figure":
         rows = figure.subplots(2, 1, sharex=True)
         _draw_frames(rows[0], comparison.without_device, "without the device", WITHOUT, count)
         _draw_frames(rows[1], comparison.with_device, "with the device", WITH, count)
+        worn, (width, height) = comparison.with_device, (size / print_scale() for size in figure.get_size_inches())
         remark = "outline: healthy foot; cross: toes below ground in mid-swing"
-        worn = comparison.with_device
-        write_head(figure, f"{worn.scenario.name}: one stride", remark, worn.recording.kind)
+        # About 15 letters of the remark go on an inch.
+        remark = "\n".join(textwrap.wrap(remark, round(15.0 * width)))
+        for text, top, letters, colour in (
+            (f"{worn.scenario.name}: one stride", 0.12, 11.0, BLACK),
+            (remark, 0.36, 9.0, GREY),
+        ):
+            style: dict[str, Any] = {"fontsize": font_size(letters), "color": colour, "parse_math": False}
+            figure.text(0.12 / width, 1.0 - top / height, text, ha="left", va="top", **style)
+        mark_kind(figure, worn.recording.kind)
         return figure
 
 
