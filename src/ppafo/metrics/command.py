@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.metrics.gas import PEAKS
-from ppafo.metrics.metric import MetricKind, ReadAt, root_mean
+from ppafo.metrics.metric import MetricKind, ReadAt, metered, root_mean
 from ppafo.model.helping import MID_STANCE
 from ppafo.model.valves.kind import VENTS_ABOVE
 from ppafo.signals import Recording
@@ -112,46 +112,27 @@ def requested_samples(recording: Recording) -> Masks:
     return np.asarray((recording["command"] <= VENTS_ABOVE) & (recording["controller_phase"] != MID_STANCE))
 
 
+_REVERSED = "times that the command turns from more than half open one way to more than half open the other"
+_REQUESTED = {
+    "torque_error": ("squares", "requested torque less actuator torque", -1),
+    "requested_torque": ("requested", "requested torque", None),
+}
+"""Sum of squares of each metric where the controller requests a torque, its summary, and which direction is better."""
 METRICS = (
-    MetricKind(
-        "torque_error",
-        "N m",
-        "RMS of requested torque less actuator torque where the controller requests one",
-        (),
-        None,
-        ReadAt(("meters.asked.squares", "meters.asked.samples"), root_mean),
-        (ASKED,),
-        needs=(WALK, REQUESTED),
-        better=-1,
+    *(
+        MetricKind(
+            name,
+            "N m",
+            f"RMS of {words} where the controller requests one",
+            (),
+            None,
+            ReadAt((f"meters.asked.{squares}", "meters.asked.samples"), root_mean),
+            (ASKED,),
+            needs=(WALK, REQUESTED),
+            better=better,
+        )
+        for name, (squares, words, better) in _REQUESTED.items()
     ),
-    MetricKind(
-        "requested_torque",
-        "N m",
-        "RMS of requested torque where the controller requests one",
-        (),
-        None,
-        ReadAt(("meters.asked.requested", "meters.asked.samples"), root_mean),
-        (ASKED,),
-        needs=(WALK, REQUESTED),
-    ),
-    MetricKind(
-        "peak_torque",
-        "N m",
-        "largest absolute torque of the actuator",
-        ("torque",),
-        peak_torque,
-        ReadAt(("meters.peaks.torque",)),
-        (PEAKS,),
-        better=0,
-    ),
-    MetricKind(
-        "command_reversals",
-        "-",
-        "times that the command turns from more than half open one way to more than half open the other",
-        ("command",),
-        command_reversals,
-        ReadAt(("meters.reversals.turns",)),
-        (REVERSALS,),
-        better=0,
-    ),
+    metered(peak_torque, "N m", "largest absolute torque of the actuator", ("torque",), (PEAKS, "torque"), better=0),
+    metered(command_reversals, "-", _REVERSED, ("command",), (REVERSALS, "turns"), better=0),
 )

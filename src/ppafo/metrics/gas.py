@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.metrics.metric import Floats, MetricKind, ReadAt
+from ppafo.metrics.metric import Floats, MetricKind, ReadAt, metered
+from ppafo.metrics.motion import MOTION
 from ppafo.model.columns import Numeric, choose
 from ppafo.model.declaration import PlainFunction
 from ppafo.signals import Recording
@@ -155,29 +156,6 @@ def update_peaks(state: Peaks, _course: ReferenceSummary, sample: Sample) -> Pea
 PEAKS = MeterKind("peaks", Peaks, start_peaks, update_peaks)
 
 
-class Work(NamedTuple):
-    """State of the work meter: torque [N m] and angle [rad] at the last sample, work so far [J]."""
-
-    torque: float
-    angle: float
-    work: float
-
-
-def start_work(course: ReferenceSummary, sample: Sample) -> Work:
-    """Start the work meter at the first sample."""
-    return Work(sample.torque, sample.angle, 0.0)
-
-
-def update_work(state: Work, course: ReferenceSummary, sample: Sample) -> Work:
-    """Update the work meter with a sample, by the trapezoidal rule over the angle."""
-    piece = 0.5 * (state.torque + sample.torque) * (sample.angle - state.angle)
-    return Work(sample.torque, sample.angle, state.work + piece)
-
-
-# A locked vane does no work: the engine leaves the meter as it started.
-WORK = MeterKind("work", Work, start_work, update_work, of_motion=True)
-
-
 def ratio(above: Floats, below: Floats) -> Floats:
     """Quotient of two arrays; nan unless the divisor is positive."""
     # nan where a recording has None: a column has no other word for it.
@@ -195,6 +173,8 @@ def of_gas(supplied: Floats, work: Floats) -> Floats:
     return ratio(gas_taken(supplied), work)
 
 
+_WORK, _SUPPLIED = (MOTION, "work"), (GAS, "gained.supplied_mass")
+_COLDEST = "lowest temperature of the gas in a chamber, of a gas with an energy balance"
 WITH_ENERGY_BALANCE = frozenset({"temperature_1", "temperature_2", *ENERGIES})
 """Channels present only with an energy balance of the gas."""
 
@@ -229,51 +209,9 @@ METRICS = (
         energy_imbalance,
         ENERGY,
     ),
-    MetricKind(
-        "largest_pressure",
-        "Pa",
-        "largest chamber pressure",
-        ("pressure_1",),
-        largest_pressure,
-        ReadAt(("meters.peaks.pressure",)),
-        (PEAKS,),
-    ),
-    MetricKind(
-        "lowest_temperature",
-        "K",
-        "lowest temperature of the gas in a chamber, of a gas with an energy balance",
-        ("temperature_1",),
-        lowest_temperature,
-        ReadAt(("meters.peaks.temperature",)),
-        (PEAKS,),
-    ),
-    MetricKind(
-        "mechanical_work",
-        "J",
-        "work of the actuator on the joint",
-        ("torque", "angle"),
-        mechanical_work,
-        ReadAt(("meters.work.work",)),
-        (WORK,),
-        better=0,
-    ),
-    MetricKind(
-        "work_per_gas",
-        "J/kg",
-        "work per supplied gas",
-        _EFFORT,
-        work_per_gas,
-        ReadAt(("meters.work.work", "meters.gas.gained.supplied_mass"), per_gas),
-        (WORK, GAS),
-    ),
-    MetricKind(
-        "gas_per_work",
-        "kg/J",
-        "supplied gas per work",
-        _EFFORT,
-        gas_per_work,
-        ReadAt(("meters.gas.gained.supplied_mass", "meters.work.work"), of_gas),
-        (WORK, GAS),
-        better=-1,
-    ),
+    metered(largest_pressure, "Pa", "largest chamber pressure", ("pressure_1",), (PEAKS, "pressure")),
+    metered(lowest_temperature, "K", _COLDEST, ("temperature_1",), (PEAKS, "temperature")),
+    metered(mechanical_work, "J", "work of the actuator on the joint", ("torque", "angle"), _WORK, better=0),
+    metered(work_per_gas, "J/kg", "work per supplied gas", _EFFORT, _WORK, _SUPPLIED, function=per_gas),
+    metered(gas_per_work, "kg/J", "supplied gas per work", _EFFORT, _SUPPLIED, _WORK, function=of_gas, better=-1),
 )

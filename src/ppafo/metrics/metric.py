@@ -76,7 +76,7 @@ class Readings:
 
 @dataclass(frozen=True, slots=True)
 class ReadAt:
-    """Reading of a metric from meters: number at a path such as ``meters.work.work``, or a function of several.
+    """Reading of a metric from meters: number at a path such as ``meters.motion.work``, or a function of several.
 
     Declared as data, so that an exported library has one expression for the metric instead of a function.
     """
@@ -139,6 +139,22 @@ class MetricKind:
     needs: tuple[str, ...] = ()
     of_reference: str = ""
     better: int | None = None
+
+
+def metered(
+    compute: Callable[[Recording], float | None],
+    unit: str,
+    summary: str,
+    channels: tuple[str, ...],
+    *numbers: tuple[MeterKind, str],
+    function: PlainFunction | None = None,
+    needs: tuple[str, ...] = (),
+    better: int | None = None,
+) -> MetricKind:
+    """Declare the metric that a function computes, by its name, read as numbers of meters or a ``function`` of them."""
+    read = ReadAt(tuple(f"meters.{meter.name}.{number}" for meter, number in numbers), function)
+    meters = tuple({meter.name: meter for meter, _ in numbers}.values())
+    return MetricKind(compute.__name__, unit, summary, channels, compute, read, meters, needs=needs, better=better)
 
 
 def for_each_reference(kinds: tuple[MetricKind, ...], rename: Callable[[str, str], str]) -> tuple[MetricKind, ...]:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less
+from ppafo.metrics.metric import Floats, MetricKind, Readings, less, metered
 from ppafo.model.columns import root
 from ppafo.signals import Recording
 from ppafo.signals.meter import LED_SHANK, MeterKind, ReferenceSummary, Sample
@@ -43,29 +43,39 @@ def time_of_fraction(recording: Recording, fraction: float) -> float | None:
     return float(np.interp(fraction, done[after - 1 : after + 1], recording.time[after - 1 : after + 1]))
 
 
-class Extremes(NamedTuple):
-    """State of the motion meter: smallest and largest angle [rad], largest absolute angular velocity [rad/s]."""
+class _Motion(NamedTuple):
+    """State of the motion meter: torque [N m] and angle [rad] at the last sample, work so far [J], extremes.
 
+    These are smallest and largest angle [rad], and largest absolute angular velocity [rad/s].
+    """
+
+    torque: float
+    angle: float
+    work: float
     smallest: float
     largest: float
     speed: float
 
 
-def start_extremes(course: ReferenceSummary, sample: Sample) -> Extremes:
+def start_motion(course: ReferenceSummary, sample: Sample) -> _Motion:
     """Start the motion meter at the first sample."""
-    return Extremes(sample.angle, sample.angle, abs(sample.angular_velocity))
+    return _Motion(sample.torque, sample.angle, 0.0, sample.angle, sample.angle, abs(sample.angular_velocity))
 
 
-def update_extremes(state: Extremes, course: ReferenceSummary, sample: Sample) -> Extremes:
-    """Update the motion meter with a sample."""
-    return Extremes(
+def update_motion(state: _Motion, course: ReferenceSummary, sample: Sample) -> _Motion:
+    """Update the motion meter with a sample; work by the trapezoidal rule over the angle."""
+    return _Motion(
+        torque=sample.torque,
+        angle=sample.angle,
+        work=state.work + 0.5 * (state.torque + sample.torque) * (sample.angle - state.angle),
         smallest=min(state.smallest, sample.angle),
         largest=max(state.largest, sample.angle),
         speed=max(state.speed, abs(sample.angular_velocity)),
     )
 
 
-EXTREMES = MeterKind("extremes", Extremes, start_extremes, update_extremes, of_motion=True)
+# A locked vane does no work: the engine leaves the meter as it started.
+MOTION = MeterKind("motion", _Motion, start_motion, update_motion, of_motion=True)
 
 
 def read_time_of_fraction(readings: Readings, fraction: float) -> Floats:
@@ -131,6 +141,9 @@ def _time(name: str, fraction: float, summary: str) -> MetricKind:
     return MetricKind(name, "s", summary, ("angle",), compute, read, traced=("angle",))
 
 
+_TOES = "lowest height of the toes over the measured gait's, below 0 where lower"
+_SPEED = "largest absolute angular velocity of the samples"
+_ENDS = (MOTION, "largest"), (MOTION, "smallest")
 METRICS = (
     MetricKind(
         "foot_angle_error",
@@ -142,34 +155,9 @@ METRICS = (
         (FOOT_ERROR,),
         needs=(LED_SHANK,),
     ),
-    MetricKind(
-        "toe_clearance_error",
-        "m",
-        "lowest height of the toes over the measured gait's, below 0 where lower",
-        ("toe_difference",),
-        toe_clearance_error,
-        ReadAt(("meters.foot_error.lowest",)),
-        (FOOT_ERROR,),
-        needs=(LED_SHANK,),
-    ),
-    MetricKind(
-        "angle_range",
-        "rad",
-        "largest angle less smallest angle",
-        ("angle",),
-        angle_range,
-        ReadAt(("meters.extremes.largest", "meters.extremes.smallest"), less),
-        (EXTREMES,),
-    ),
-    MetricKind(
-        "largest_speed",
-        "rad/s",
-        "largest absolute angular velocity of the samples",
-        ("angular_velocity",),
-        largest_speed,
-        ReadAt(("meters.extremes.speed",)),
-        (EXTREMES,),
-    ),
+    metered(toe_clearance_error, "m", _TOES, ("toe_difference",), (FOOT_ERROR, "lowest"), needs=(LED_SHANK,)),
+    metered(angle_range, "rad", "largest angle less smallest angle", ("angle",), *_ENDS, function=less),
+    metered(largest_speed, "rad/s", _SPEED, ("angular_velocity",), (MOTION, "speed")),
     _time("departure_time", TRAVEL_FRACTION, "time at which 1 % of the move is done"),
     _time("arrival_time", 1.0 - TRAVEL_FRACTION, "time at which 99 % of the move is done"),
 )

@@ -16,7 +16,7 @@ import numpy as np
 
 from ppafo.metrics.command import Reversals, is_torque_requested, start_reversals, update_reversals
 from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, root_mean
-from ppafo.metrics.switching import OSCILLATION_THRESHOLD, UNDECIDED, Swing, count_of, next_swing
+from ppafo.metrics.switching import OSCILLATION_THRESHOLD, UNDECIDED, Swing, begun_swing, count_of, next_swing
 from ppafo.model.columns import larger
 from ppafo.model.helping import PUSH_OFF
 from ppafo.signals.meter import (
@@ -360,11 +360,6 @@ def meets(course: ReferenceSummary, sample: Sample) -> bool:
     return course.start_up == 0.0 and abs(sample.value - sample.reference) <= LARGEST_SHARE * course.largest
 
 
-def begun(swing: Swing, value: float, anew: bool) -> Swing:
-    """Return the reversal state ``swing`` with a value, or that of a part that begins ``anew`` with the value."""
-    return Swing(value if anew else swing.play, UNDECIDED if anew else swing.turns, value if anew else swing.highest)
-
-
 def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, late: float, lag: float) -> PartSums:
     """Return the sums of the present part with a sample, anew where the part is not judged yet.
 
@@ -393,8 +388,8 @@ def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, late
         lag_squares=lag * lag + (0.0 if anew else before.lag_squares),
         lag_total=lag + (0.0 if anew else before.lag_total),
         # A lag that motion excuses is no reversal.
-        swing=begun(next_swing(before.swing, error, least + lag), error, anew),
-        lag_swing=begun(next_swing(before.lag_swing, late, least), late, anew),
+        swing=begun_swing(next_swing(before.swing, error, least + lag), error, anew),
+        lag_swing=begun_swing(next_swing(before.lag_swing, late, least), late, anew),
         lowest_error=error
         if anew
         else error + joined * min(before.lowest_error - error, 0.0)

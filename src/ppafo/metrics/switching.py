@@ -18,12 +18,12 @@ import numpy as np
 from ppafo.metrics.metric import (
     Floats,
     MetricKind,
-    ReadAt,
     Readings,
     extent,
     followed,
     for_each_reference,
     hold,
+    metered,
     ramp,
     spans,
 )
@@ -139,6 +139,11 @@ def next_swing(state: Swing, value: float, swing: float) -> Swing:
     return Swing(play, turns, max(state.highest, value))
 
 
+def begun_swing(swing: Swing, value: float, anew: bool) -> Swing:
+    """Return a reversal state with a value, or that of a part that begins ``anew`` with the value."""
+    return Swing(value if anew else swing.play, UNDECIDED if anew else swing.turns, value if anew else swing.highest)
+
+
 def count_of(turns: Floats) -> Floats:
     """Number of reversals (runs,) from ``Swing.turns``."""
     found: Floats = larger(abs(turns) - 1.0, 0.0)
@@ -163,8 +168,7 @@ def update_oscillations(state: _Oscillations, course: ReferenceSummary, sample: 
     value = sample.value
     swing = next_swing(state.swing, value, OSCILLATION_THRESHOLD * course.largest)
     anew = course.hold_start == sample.number
-    begun = Swing(value if anew else swing.play, UNDECIDED if anew else swing.turns, value if anew else swing.highest)
-    return _Oscillations(begun, swing.turns if anew else state.turns_on_ramp)
+    return _Oscillations(begun_swing(swing, value, anew), swing.turns if anew else state.turns_on_ramp)
 
 
 OSCILLATIONS = MeterKind("oscillations", _Oscillations, start_oscillations, update_oscillations, True)
@@ -198,17 +202,8 @@ _OSCILLATIONS = tuple(
     )
     for part_of, read in ((ramp, read_oscillations_ramp), (hold, read_oscillations_hold))
 )
-
+_SWITCHED = "valves switched on or off by the command, each of a pair counted: a reversal is 2"
 METRICS = (
-    MetricKind(
-        "switchings",
-        "-",
-        "valves switched on or off by the command, each of a pair counted: a reversal is 2",
-        ("command",),
-        switchings,
-        ReadAt(("meters.switchings.changes",)),
-        (SWITCHINGS,),
-        better=-1,
-    ),
+    metered(switchings, "-", _SWITCHED, ("command",), (SWITCHINGS, "changes"), better=-1),
     *for_each_reference(_OSCILLATIONS, lambda name, controlled: f"{controlled}_{name}"),
 )

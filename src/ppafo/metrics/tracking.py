@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, followed, for_each_reference, hold, ramp, spans
+from ppafo.metrics.metric import Floats, MetricKind, Readings, followed, for_each_reference, hold, metered, ramp, spans
 from ppafo.model.columns import root
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.signals import Recording
@@ -18,7 +18,7 @@ ONE_INSTANT = frozenset(
     f"final_{name}error" for name in ("" if controlled == TORQUE else f"{controlled}_" for controlled in CONTROLLED)
 )
 """Metrics of a single instant, which are arbitrary while the controlled quantity oscillates."""
-_RMS = "root-mean-square torque error"
+_RMS, _PEAK = "root-mean-square torque error", "largest absolute torque error of the whole run"
 
 
 def error_of(recording: Recording) -> Floats:
@@ -51,9 +51,13 @@ def final_error(recording: Recording) -> float:
 
 
 class _SquaredError(NamedTuple):
-    """State of the squared-error meter: last squared error, trapezoidal sums before and on the hold, in intervals."""
+    """State of the error meter: last and largest squared error, trapezoidal sums before and on the hold, in intervals.
+
+    The root of a square is the absolute error to the last bit.
+    """
 
     last: float
+    largest: float
     before_hold: float
     on_hold: float
 
@@ -61,7 +65,7 @@ class _SquaredError(NamedTuple):
 def start_squared_error(course: ReferenceSummary, sample: Sample) -> _SquaredError:
     """Start the squared-error meter at the first sample."""
     error = sample.reference - sample.value
-    return _SquaredError(error * error, 0.0, 0.0)
+    return _SquaredError(error * error, error * error, 0.0, 0.0)
 
 
 def update_squared_error(state: _SquaredError, course: ReferenceSummary, sample: Sample) -> _SquaredError:
@@ -73,33 +77,14 @@ def update_squared_error(state: _SquaredError, course: ReferenceSummary, sample:
     # The reference did not rest yet at the sample before this one.
     is_before = course.hold_start >= sample.number
     return _SquaredError(
-        square, state.before_hold + (piece if is_before else 0.0), state.on_hold + (0.0 if is_before else piece)
+        square,
+        max(state.largest, square),
+        state.before_hold + (piece if is_before else 0.0),
+        state.on_hold + (0.0 if is_before else piece),
     )
 
 
 SQUARED_ERROR = MeterKind("squared_error", _SquaredError, start_squared_error, update_squared_error, True)
-
-
-class _AbsoluteError(NamedTuple):
-    """State of the absolute-error meter: largest and last absolute error."""
-
-    largest: float
-    last: float
-
-
-def start_absolute_error(course: ReferenceSummary, sample: Sample) -> _AbsoluteError:
-    """Start the absolute-error meter at the first sample."""
-    error = abs(sample.reference - sample.value)
-    return _AbsoluteError(error, error)
-
-
-def update_absolute_error(state: _AbsoluteError, course: ReferenceSummary, sample: Sample) -> _AbsoluteError:
-    """Update the absolute-error meter with a sample."""
-    error = abs(sample.reference - sample.value)
-    return _AbsoluteError(max(state.largest, error), error)
-
-
-ABSOLUTE_ERROR = MeterKind("absolute_error", _AbsoluteError, start_absolute_error, update_absolute_error)
 
 
 def read_rms_error(readings: Readings) -> Floats:
@@ -144,25 +129,8 @@ _OF_TORQUE = (
         )
         for part_of, read in ((ramp, read_rms_error_ramp), (hold, read_rms_error_hold))
     ),
-    MetricKind(
-        "peak_error",
-        "N m",
-        "largest absolute torque error of the whole run",
-        _NEEDED,
-        peak_error,
-        ReadAt(("meters.absolute_error.largest",)),
-        (ABSOLUTE_ERROR,),
-        better=-1,
-    ),
-    MetricKind(
-        "final_error",
-        "N m",
-        "absolute torque error at the end",
-        _NEEDED,
-        final_error,
-        ReadAt(("meters.absolute_error.last",)),
-        (ABSOLUTE_ERROR,),
-    ),
+    metered(peak_error, "N m", _PEAK, _NEEDED, (SQUARED_ERROR, "largest"), function=root, better=-1),
+    metered(final_error, "N m", "absolute torque error at the end", _NEEDED, (SQUARED_ERROR, "last"), function=root),
 )
 
 METRICS = for_each_reference(_OF_TORQUE, lambda name, controlled: name.replace("error", f"{controlled}_error"))

@@ -103,7 +103,7 @@ def frames_figure(comparison: WalkComparison) -> "Figure":
         rows = figure.subplots(2, 1, sharex=True)
         _draw_frames(rows[0], comparison.without_device, "without the device", WITHOUT, count)
         _draw_frames(rows[1], comparison.with_device, "with the device", WITH, count)
-        worn, (width, height) = comparison.with_device, (size / print_scale() for size in figure.get_size_inches())
+        worn, width, height = comparison.with_device, width / scale, height / scale
         remark = "outline: healthy foot; cross: toes below ground in mid-swing"
         # About 15 letters of the remark go on an inch.
         remark = "\n".join(textwrap.wrap(remark, round(15.0 * width)))
