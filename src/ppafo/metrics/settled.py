@@ -191,6 +191,10 @@ def numbers_of(
     of_lag = 0.0 if rests > 0.0 else max(abs(part.lag_swing.turns) - 1.0, turns, 0.0)
     lag, way = math.sqrt(part.lag_squares * inverse), abs(part.last - part.first)
     wave = math.sqrt(max(part.reference_squares * inverse - mean_ahead * mean_ahead, 0.0))
+    # On a quick ramp every loop is behind: the error of a move counts less.
+    inverse_path = 1.0 / (part.path if part.path > 0.0 else 1.0)
+    slow = min(SLOW_RATE * change * (part.taken * interval) * inverse_path, 1.0)
+    of_move = max(min(RETURNING * (1.0 - way * inverse_path), 1.0), slow * slow)
     return SettledPart(
         wanted_change=wanted,
         reference_range=angle_range,
@@ -205,7 +209,7 @@ def numbers_of(
         motion=min(lag / (LARGEST_LAG * max(change, _TINY)), 1.0),
         lag=lag,
         mean_lag=part.lag_total * inverse,
-        weight=weight_of(rests, part.path, way, part.taken * interval, change),
+        weight=1.0 if rests > 0.0 else of_move,
         share=part.share,
         way=math.inf if rests > 0.0 else max(part.path, change),
         reference_mean=mean_ahead,
@@ -261,17 +265,6 @@ def error_and_oscillation(part: SettledPart, limits: PartLimits) -> tuple[float,
     # A joint that creeps has a range of its error, too, but a mean error above the standard deviation.
     swings = part.rests > 0.0 and part.error_deviation > abs(part.mean_error)
     return error, max(turning, span) if swings else turning
-
-
-def weight_of(rests: float, path: float, way: float, time: float, extent: float) -> float:
-    """Weight of the error of a part [-]: 1 at rest, less on a quick ramp, on which every loop is behind.
-
-    ``path`` of the reference leads by ``way``, with ``time`` [s] judged; ``extent`` is its largest value.
-    """
-    inverse = 1.0 / (path if path > 0.0 else 1.0)
-    slow = min(SLOW_RATE * extent * time * inverse, 1.0)
-    moving = max(min(RETURNING * (1.0 - way * inverse), 1.0), slow * slow)
-    return 1.0 if rests > 0.0 or path == 0.0 else moving
 
 
 def badness(part: PartSums, course: ReferenceSummary) -> float:

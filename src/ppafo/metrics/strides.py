@@ -105,25 +105,6 @@ def totals_at(sample: StrideSample) -> _StrideTotals:
     )
 
 
-def sums_with_stride(
-    sums: _StrideTotals, at_strike: _StrideTotals, at_end: _StrideTotals, on_toes: float
-) -> _StrideTotals:
-    """Return the sums over strides with another stride added, from the totals at its start and end.
-
-    ``on_toes`` is 1 if the stride started on the toes: this landing belongs to the stride, a landing at its end to the
-    next stride.
-    """
-    # Field by field: compiled code has no loop over a row.
-    return _StrideTotals(
-        gas=sums.gas + (at_end.gas - at_strike.gas),
-        positive_push_off_work=sums.positive_push_off_work
-        + (at_end.positive_push_off_work - at_strike.positive_push_off_work),
-        net_push_off_work=sums.net_push_off_work + (at_end.net_push_off_work - at_strike.net_push_off_work),
-        toe_clearance=sums.toe_clearance + (at_end.toe_clearance - at_strike.toe_clearance),
-        toe_landing=sums.toe_landing + on_toes,
-    )
-
-
 def begun_stride(sample: StrideSample, is_whole: float, on_toes: float) -> _CurrentStride:
     """Return a new stride that starts at a sample, with zero sums."""
     return _CurrentStride(
@@ -173,15 +154,26 @@ def stride_with_sample(stride: _CurrentStride, sample: Sample) -> _CurrentStride
 
 
 def ended_with_stride(ended: _EndedStrides, stride: _CurrentStride, sample: Sample) -> _EndedStrides:
-    """Add a stride to the completed strides; ``sample`` is the first sample after its heel strike."""
+    """Add a stride to the completed strides; ``sample`` is the first sample after its heel strike.
+
+    A landing on the toes at the start of the stride belongs to it, one at its end to the next stride.
+    """
     # In the first strides the controller still learns their time.
     is_averaged = stride.is_whole > 0.5 and ended.whole >= float(SETTLING)
-    at_end = totals_at(sample.stride)
-    sums = sums_with_stride(ended.sums, stride.at_strike, at_end, stride.on_toes) if is_averaged else ended.sums
+    at_strike, at_end, sums = stride.at_strike, totals_at(sample.stride), ended.sums
+    # Field by field: compiled code has no loop over a row.
+    with_stride = _StrideTotals(
+        gas=sums.gas + (at_end.gas - at_strike.gas),
+        positive_push_off_work=sums.positive_push_off_work
+        + (at_end.positive_push_off_work - at_strike.positive_push_off_work),
+        net_push_off_work=sums.net_push_off_work + (at_end.net_push_off_work - at_strike.net_push_off_work),
+        toe_clearance=sums.toe_clearance + (at_end.toe_clearance - at_strike.toe_clearance),
+        toe_landing=sums.toe_landing + stride.on_toes,
+    )
     return _EndedStrides(
         whole=ended.whole + stride.is_whole,
         averaged=ended.averaged + (1.0 if is_averaged else 0.0),
-        sums=sums,
+        sums=with_stride if is_averaged else sums,
         squared_errors=ended.squared_errors + (stride.squared_errors if is_averaged else 0.0),
         push_off_samples=ended.push_off_samples + (stride.push_off_samples if is_averaged else 0.0),
     )
