@@ -290,15 +290,14 @@ def _chosen(
             raise StudyError(
                 f"study '{study.name}': '{path}' varies only in {', '.join(varying)}; omit the other scenarios"
             )
-        named = configurations.values() if isinstance(configurations, Mapping) else configurations
-        with at_fault("configurations"):
-            scenarios = [ask.scenario_or_load(named_scenario) for named_scenario in named]
-        names = (
-            list(configurations) if isinstance(configurations, Mapping) else [scenario.name for scenario in scenarios]
+        pairs = (
+            configurations.items() if isinstance(configurations, Mapping) else [("", each) for each in configurations]
         )
-        if (repeated := first_twice(names)) is not None:
+        with at_fault("configurations"):
+            loaded = [(name, ask.scenario_or_load(scenario)) for name, scenario in pairs]
+        chosen = tuple(ask.Configuration(name or scenario.name, scenario) for name, scenario in loaded)
+        if (repeated := first_twice([each.name for each in chosen])) is not None:
             raise StudyError(f"two scenarios are named '{repeated}'; give different names in a study file")
-        chosen = tuple(map(ask.Configuration, names, scenarios))
     if len(chosen) < 2:
         raise StudyError(f"a comparison needs at least two configurations, not {len(chosen)}")
     return ask.configurations_with(chosen, overrides)
