@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from ppafo.storage.column_map import ColumnMap
     from ppafo.validation.agreement import ChannelAgreement, RecordingAgreement
     from ppafo.validation.causes import Diagnosis
+    from ppafo.validation.measured import MeasuredRecording
     from ppafo.validation.settings import ReplaySettings
 
 SetLike = Annotated[str | Path, Word("PARAMETERS")]
@@ -197,7 +198,7 @@ def validate(
     from ppafo.parameters import load_device
     from ppafo.validation.agreement import compare_recording
     from ppafo.validation.causes import causes_of
-    from ppafo.validation.measured import read_all
+    from ppafo.validation.measured import read_measured
     from ppafo.validation.settings import LARGEST_DELAY, MOTIONS, ReplaySettings, parse_initial, parse_thresholds
 
     report = progress or report_nothing
@@ -213,8 +214,15 @@ def validate(
         raise DataError(f"motion '{chosen}': a fixed volume has no moving vane")
     states = parse_initial(initial, device.supply.atmospheric_pressure)
     settings = ReplaySettings(chosen, states, longest_delay, parse_thresholds(thresholds), volume)
+    if not recordings:
+        raise DataError("no recording was given; give at least one .csv or .nc file or result folder")
+    read: dict[str, MeasuredRecording] = {}
+    for measured in (read_measured(source, device, columns) for source in recordings):
+        # Given twice, under two names too, a recording would count twice as evidence.
+        if (same := read.setdefault(measured.sha256, measured)) is not measured:
+            raise DataError(f"{measured.file}: is the same recording as {same.file}; give every recording only once")
     agreements = []
-    for measured in read_all(recordings, device, columns):
+    for measured in read.values():
         report(Progress(f"replaying {measured.file}"))
         agreements.append(compare_recording(measured, device, settings))
     causes = causes_of(agreements, report)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError, PpafoError, check_all, noted_in, raise_noted
-from ppafo.gait.gait import HARMONICS, KNEE, Gait, fit_curve
+from ppafo.gait.gait import HARMONICS, KNEE, REQUIRED, Gait, fit_curve
 from ppafo.signals.recording import Floats
 from ppafo.wording import without_exponent
 
@@ -278,33 +278,43 @@ def standing_turns(shank: Floats, ankle: Floats) -> tuple[float, float]:
     return float(np.std(stand - lean)), float(np.std(stand + lean))
 
 
-def sign_remarks(shank: Floats, ankle: Floats) -> list[str]:
-    """Return a remark on an ankle angle whose sign cannot be verified while the foot stands."""
+def stride_remarks(curves: Mapping[str, Floats]) -> list[str]:
+    """Return remarks on the curves of a stride, both ends included: unusual force, unclear signs, zero of the ankle."""
+    remarks, shank, ankle = list[str](), curves["shank_angle"], curves["ankle_angle"]
+    if "vertical_force" in curves:
+        # Both ends are one phase, which must not count twice.
+        mean, (low, high) = float(np.mean(curves["vertical_force"][:-1])), USUAL_FORCE_MEAN
+        if not low <= mean <= high:
+            remarks.append(
+                f"vertical_force has a mean of {mean:.3g} body weights, but each leg of a steady walk carries about "
+                f"0.5 (usual: {low:g} to {high:g})"
+            )
     turned, reversed_turned = standing_turns(shank, ankle)
-    if CLEARLY_BETTER * turned <= reversed_turned:
-        return []
-    return [
-        f"the sign of ankle_angle is uncertain: in mid-stance the flat foot rotates by {turned:.2g} deg (RMS), and by "
-        f"{reversed_turned:.2g} deg with the opposite sign"
-    ]
-
-
-def zero_remarks(shank: Floats, ankle: Floats) -> list[str]:
-    """Return a remark on the zero of an ankle angle if the standing foot appears tilted; curves [rad]."""
-    tilt = standing_tilt(shank, ankle)
-    if abs(tilt) <= REMARKED_TILT:
-        return []
-    way = "toes down" if tilt > 0.0 else "toes up"
-    return [
-        f"the zero of ankle_angle seems to be off: the flat foot appears tilted by {abs(tilt):.1f} deg, {way} (mean "
-        f"from 15 to 40 % of the stride, usual on level ground: up to {REMARKED_TILT:g} deg)"
-    ]
+    if CLEARLY_BETTER * turned > reversed_turned:
+        remarks.append(
+            f"the sign of ankle_angle is uncertain: in mid-stance the flat foot rotates by {turned:.2g} deg (RMS), and "
+            f"by {reversed_turned:.2g} deg with the opposite sign"
+        )
+    if "ankle_moment" in curves:
+        down, up = float(np.max(curves["ankle_moment"])), float(-np.min(curves["ankle_moment"]))
+        if up > _UNCLEAR_MOMENT * down:
+            remarks.append(
+                f"the sign of ankle_moment is uncertain: it peaks at {down:.2g} N m/kg in plantarflexion and {up:.2g} "
+                "N m/kg in dorsiflexion"
+            )
+    if abs(tilt := standing_tilt(shank, ankle)) > REMARKED_TILT:
+        remarks.append(
+            f"the zero of ankle_angle seems to be off: the flat foot appears tilted by {abs(tilt):.1f} deg, toes "
+            f"{'down' if tilt > 0.0 else 'up'} (mean from 15 to 40 % of the stride, usual on level ground: up to "
+            f"{REMARKED_TILT:g} deg)"
+        )
+    return remarks
 
 
 def gait_file_remarks(gait: Gait) -> list[str]:
-    """Return a remark on the ankle zero of a finished gait."""
+    """Return remarks on sign and zero of the ankle angle of a finished gait."""
     percent = np.linspace(0.0, 1.0, 101)
-    return zero_remarks(gait.shank_angle.values_at(percent), gait.ankle_angle.values_at(percent))
+    return stride_remarks({name: gait.curve(name).values_at(percent) for name in REQUIRED})
 
 
 def check_force_scale(file: str, force: Floats) -> None:
@@ -334,17 +344,6 @@ def check_moment(walk: MeanStride) -> None:
         raise DataError(
             f"{where} reaches {without_exponent(peak, '.3g')} N m/kg (plausible: {low:g} to {high:g} N m/kg)"
         )
-
-
-def moment_remarks(moment: Floats) -> list[str]:
-    """Return a remark on an ankle moment [N m/kg] whose sign cannot be verified from its curve."""
-    down, up = float(np.max(moment)), float(-np.min(moment))
-    if up <= _UNCLEAR_MOMENT * down:
-        return []
-    return [
-        f"the sign of ankle_moment is uncertain: it peaks at {down:.2g} N m/kg in plantarflexion and {up:.2g} N m/kg "
-        "in dorsiflexion"
-    ]
 
 
 def check_moment_time(walk: MeanStride) -> None:
@@ -389,18 +388,6 @@ def check_centre_of_pressure(walk: MeanStride) -> None:
             f"{walk.where('centre_of_pressure')} is {back:.3g} to {front:.3g} m in front of the ankle (plausible: "
             f"within {low:g} to {high:g} m, and over {LEAST_ROLL:g} m or more)"
         )
-
-
-def force_remarks(force: Floats) -> list[str]:
-    """Return a remark on an unusual mean vertical force [body weights] over a stride; ``force`` includes both ends."""
-    # Both ends are one phase, which must not count twice.
-    mean, (low, high) = float(np.mean(force[:-1])), USUAL_FORCE_MEAN
-    if low <= mean <= high:
-        return []
-    return [
-        f"vertical_force has a mean of {mean:.3g} body weights, but each leg of a steady walk carries about 0.5 "
-        f"(usual: {low:g} to {high:g})"
-    ]
 
 
 FOOT_FLAT = slice(15, 43)

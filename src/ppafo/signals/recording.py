@@ -416,31 +416,24 @@ def _check_finite(recording: Recording, name: str, values: Floats) -> None:
 def _read_only(values: ArrayLike, unit: str) -> Floats:
     """Return a copy of numbers in a unit. Raises DataError for others, and for numbers that carry another unit."""
     try:
-        copy = _numbers(values, unit)
+        numbers, own = carried(values) or (values, unit)
+        given = numbers if isinstance(numbers, np.ma.MaskedArray) else np.asarray(numbers)
+        # NumPy makes numbers of times and texts, and of complex ones their real part. A masked value is none, whatever
+        # number stands behind the mask.
+        has_numbers = given.dtype.kind in "biufO"
+        copy = np.ma.filled(given.astype(np.float64), np.nan) if has_numbers else np.zeros(0)
     except PpafoError:
         raise
     except Exception as error:  # a foreign object may raise anything
         raise DataError(f"the values of a channel must be numbers: {one_line(error)}") from error
+    if _SAME_UNIT.get(own, own) != _SAME_UNIT.get(unit, unit):
+        raise DataError(f"the values of a channel in '{unit}' carry the unit '{own}': convert them before")
+    if not has_numbers:
+        raise DataError(f"the values of a channel must be numbers, not {given.dtype}")
     if copy.ndim != 1:
         raise DataError(f"the values of a channel must be one-dimensional, not an array of {copy.ndim} dimensions")
     copy.setflags(write=False)
-    return copy
-
-
-def _numbers(values: Any, unit: str) -> Floats:
-    if (with_unit := carried(values)) is not None:
-        values, own = with_unit
-        if _SAME_UNIT.get(own, own) != _SAME_UNIT.get(unit, unit):
-            raise DataError(f"the values of a channel in '{unit}' carry the unit '{own}': convert them before")
-    given = np.ma.asanyarray(values) if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
-    # NumPy makes numbers of times and texts, and of complex ones their real part.
-    if given.dtype.kind not in "biufO":
-        raise DataError(f"the values of a channel must be numbers, not {given.dtype}")
-    copy = np.array(given, dtype=np.float64)
-    if isinstance(given, np.ma.MaskedArray):
-        # A masked value is none, whatever number stands behind the mask.
-        copy[np.ma.getmaskarray(given)] = np.nan
-    return copy
+    return np.asarray(copy)
 
 
 def _span(recording: Recording) -> str:

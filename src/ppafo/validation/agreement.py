@@ -27,6 +27,8 @@ from ppafo.validation.settings import (
     PRESSURE_2,
     PRESSURE_DIFFERENCE,
     ReplaySettings,
+    full_range,
+    usual_zero,
 )
 from ppafo.wording import argument_text
 
@@ -192,7 +194,7 @@ def agreement_of(request: Replay, replayed: Replayed, known_delay: float | None 
         needed = "pressure_1" if of_volume else "a channel other than the prescribed angle"
         raise DataError(f"{measured.file}: no channel can be compared; the recording needs {needed}")
     gauge = supply_gauge(recorded, device)
-    full_ranges = {name: COMPARED[name].full_range(device, gauge) for name in samples}
+    full_ranges = {name: full_range(name, device, gauge) for name in samples}
     # Sums and multiples of two others do not count twice.
     sensed = [name for name in (ANGLE, PRESSURE_1, PRESSURE_2) if name in samples] or list(samples)[:1]
     lag, is_at_limit = known_delay or 0.0, False
@@ -211,8 +213,8 @@ def agreement_of(request: Replay, replayed: Replayed, known_delay: float | None 
     return replace(agreement, channels=tuple(channels))
 
 
-def _channel(agreement: RecordingAgreement, name: str, values: Floats, full_range: float) -> ChannelAgreement:
-    """Return the errors of the model in a channel with a full range [SI], of which the ``values`` were recorded.
+def _channel(agreement: RecordingAgreement, name: str, values: Floats, span: float) -> ChannelAgreement:
+    """Return the errors of the model in a channel of a full range ``span`` [SI], with the recorded ``values``.
 
     Unless the user sets a limit, it is 3 % of full range or half of the signal variance, whichever is less, combined
     with the noise and with the usual zero error of sensors (the only visible error of a constant signal).
@@ -225,26 +227,26 @@ def _channel(agreement: RecordingAgreement, name: str, values: Floats, full_rang
     weights = weights / weights.sum()
     model, unaligned = (np.interp(times - delay, replay.time, replay[name]) for delay in (agreement.delay, 0.0))
     residuals = values - model
-    noise = max(noise_in(values, full_range), correlated_noise_of(residuals))
+    noise = max(noise_in(values, span), correlated_noise_of(residuals))
     deviation = values - weights @ values
     variation = math.sqrt(max(float(weights @ deviation**2) - noise * noise, 0.0))
     worst = int(np.argmax(np.abs(residuals)))
-    usual_zero, thresholds = COMPARED[name].usual_zero(request.device), request.settings.thresholds
+    zero_error, thresholds = usual_zero(name, request.device), request.settings.thresholds
     if (allowed := thresholds.get(name, thresholds.get(""))) is not None:
-        limit = allowed.value if allowed.is_fraction else allowed.value / full_range
+        limit = allowed.value if allowed.is_fraction else allowed.value / span
     else:
-        explained = min(ACCEPTABLE_FRACTION * full_range, math.sqrt(1.0 - EXPLAINED_FRACTION) * variation)
+        explained = min(ACCEPTABLE_FRACTION * span, math.sqrt(1.0 - EXPLAINED_FRACTION) * variation)
         # Of a low supply the usual zero is much of the range: there the limit stays a fraction of it.
-        zero = min(max(usual_zero, _UNMOVED * full_range), ACCEPTABLE_FRACTION * full_range)
-        limit = math.hypot(explained, zero, _WITHIN_NOISE * noise) / full_range
+        zero = min(max(zero_error, _UNMOVED * span), ACCEPTABLE_FRACTION * span)
+        limit = math.hypot(explained, zero, _WITHIN_NOISE * noise) / span
     return ChannelAgreement(
         channel=name,
         unit=COMPARED[name].unit,
         values=values,
         model=model,
         residuals=residuals,
-        full_range=full_range,
-        usual_zero=usual_zero,
+        full_range=span,
+        usual_zero=zero_error,
         noise=noise,
         variation=variation,
         rms=float(np.sqrt(weights @ residuals**2)),
@@ -269,8 +271,8 @@ def _estimated_delay(
     def cost(delay: float) -> float:
         """Return the mean squared error over all samples and channels, in units of full range squared [-]."""
         errors = [
-            (np.interp(times[thinned] - delay, model_times, model) - values[thinned]) / full_range
-            for values, model, full_range in curves
+            (np.interp(times[thinned] - delay, model_times, model) - values[thinned]) / span
+            for values, model, span in curves
         ]
         return sum(float(np.square(error).mean()) for error in errors) / len(errors)
 

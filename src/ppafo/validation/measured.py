@@ -1,7 +1,6 @@
 """Recordings for validation: reading from file, and checks that a recording can be compared with the model."""
 
 import hashlib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,7 +26,7 @@ from ppafo.storage.foreign import read_foreign
 from ppafo.storage.reading import read_recording
 from ppafo.storage.result_folder import NETCDF_FILE
 from ppafo.units.shown import in_units, shown_text
-from ppafo.validation.settings import COMPARED, PRESSURE_1, PRESSURE_2
+from ppafo.validation.settings import COMPARED, PRESSURE_1, PRESSURE_2, full_range
 from ppafo.wording import count_of, nearest_name
 
 MINIMUM_SAMPLES = 10
@@ -62,47 +61,27 @@ class MeasuredRecording:
 def read_measured(
     source: "Recording | DataFrame | Dataset | str | Path",
     device: Device,
-    columns: ColumnMap | None = None,
-    map_name: str = "",
+    columns: "ColumnMap | str | Path | None" = None,
 ) -> MeasuredRecording:
     """Read and check a recording, given as an object, a file or a result folder.
 
-    With ``columns``, a file is read through this column map, which messages call ``map_name``. Raises DataError if the
-    recording cannot be compared with a model.
+    With ``columns``, a file is read through this column map. Raises DataError if the recording cannot be compared with
+    a model.
     """
     atmosphere = device.supply.atmospheric_pressure
+    column_map, map_name = (None, "") if columns is None else column_map_of(columns)
     if not isinstance(source, str | Path):
         given = source if isinstance(source, Recording) else read_recording(source, atmosphere=atmosphere)
         values = np.concatenate([given.time, *(given[name] for name in sorted(given.names))])
         return check_recording(given, device, given.label, hashlib.sha256(values.tobytes()).hexdigest())
     place = Path(source)
-    if columns is None or place.is_dir():
+    if column_map is None or place.is_dir():
         recording = read_recording(place, atmosphere=atmosphere)
     else:
         gas = f"{device.gas.molar_mass!r} kg/mol"
-        recording = read_foreign(place, columns, atmosphere=atmosphere, map_name=map_name, gas=gas)
+        recording = read_foreign(place, column_map, atmosphere=atmosphere, map_name=map_name, gas=gas)
     content = read_bytes(place / NETCDF_FILE if place.is_dir() else place)
     return check_recording(recording, device, str(source), hashlib.sha256(content).hexdigest())
-
-
-def read_all(
-    sources: "Sequence[Recording | DataFrame | Dataset | str | Path]",
-    device: Device,
-    columns: "ColumnMap | str | Path | None",
-) -> list[MeasuredRecording]:
-    """Read all recordings of a validation. Raises DataError for no recording or for a recording given twice."""
-    if not sources:
-        raise DataError("no recording was given; give at least one .csv or .nc file or result folder")
-    column_map, map_name = (None, "") if columns is None else column_map_of(columns)
-    read: dict[str, MeasuredRecording] = {}
-    for source in sources:
-        measured = read_measured(source, device, column_map, map_name)
-        # Given twice, under two names too, a recording would count twice as evidence.
-        if measured.sha256 in read:
-            same = read[measured.sha256].file
-            raise DataError(f"{measured.file}: is the same recording as {same}; give every recording only once")
-        read[measured.sha256] = measured
-    return list(read.values())
 
 
 @in_units(lambda _recording, device, *_: device.shown)
@@ -130,9 +109,9 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     highest = max(supply.pressure, supply.dorsiflexion_pressure)
     supplies = (SUPPLY, DORSIFLEXION_SUPPLY)
     for name in (name for name in (*supplies, *COMPARED) if name in recording):
-        full_range = highest if name in supplies else COMPARED[name].full_range(device, highest)
+        most = highest if name in supplies else full_range(name, device, highest)
         worst = int(np.argmax(np.abs(recording[name])))
-        if abs(recording[name][worst]) > _MAXIMUM_RANGES * full_range:
+        if abs(recording[name][worst]) > _MAXIMUM_RANGES * most:
             where = f"{recording.time[worst]:.6g} s (sample {worst + 1})"
             raise DataError(
                 f"{file}: '{name}' is {shown_text(recording[name][worst], recording.unit(name))} at {where}, more than "
@@ -156,7 +135,7 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
             "gauge pressure"
         )
     # Every model would agree with a recording in which no channel changes.
-    fractions = [lasting_change(recording[name]) / COMPARED[name].full_range(device, gauge) for name in compared]
+    fractions = [lasting_change(recording[name]) / full_range(name, device, gauge) for name in compared]
     if max(fractions) < _MINIMUM_CHANGE:
         raise DataError(
             f"{file}: {', '.join(compared)} change by less than {_MINIMUM_CHANGE:.0%} of full range, which is too "

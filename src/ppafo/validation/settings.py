@@ -1,8 +1,8 @@
 """Settings of a validation in SI units: compared channels, motion, initial values, delay limit and error limits."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.parameters.device import Device
@@ -27,44 +27,39 @@ LARGEST_DELAY = 1.0
 """Largest delay limit that a user may set [s]."""
 
 
-@dataclass(frozen=True, slots=True)
-class ComparedChannel:
-    """Channel compared between recording and model.
-
-    ``unit`` is the SI unit of an error (``Pa_d`` for a pressure difference), ``quantity`` the kind of quantity,
-    ``title`` the label. ``full_range(device, gauge)`` is the full range [SI] of a device with a gauge supply pressure
-    [Pa].
-    """
+class ComparedChannel(NamedTuple):
+    """Channel compared between recording and model: SI unit of an error, kind of quantity, and label."""
 
     unit: str
     quantity: str
     title: str
-    full_range: Callable[[Device, float], float]
-
-    def usual_zero(self, device: Device) -> float:
-        """Return the usual zero error of a sensor, or its effect on a computed channel [SI unit of the channel]."""
-        # Pressure difference and torque have the zeros of both sensors, as their full ranges have both pressures.
-        return ANGLE_ERRORS.zero if self.quantity == "angle" else self.full_range(device, PRESSURE_ERRORS.zero)
 
 
-COMPARED: dict[str, ComparedChannel] = {
-    ANGLE: ComparedChannel(
-        "rad", "angle", "Vane angle", lambda device, _: device.actuator.angle_max - device.actuator.angle_min
-    ),
-    PRESSURE_1: ComparedChannel("Pa_d", "pressure change", "Pressure in chamber 1", lambda _, gauge: gauge),
-    PRESSURE_2: ComparedChannel("Pa_d", "pressure change", "Pressure in chamber 2", lambda _, gauge: gauge),
-    PRESSURE_DIFFERENCE: ComparedChannel(
-        "Pa_d", "pressure change", "Pressure difference", lambda _, gauge: 2.0 * gauge
-    ),
-    TORQUE: ComparedChannel(
-        "N m", "torque", "Actuator torque", lambda device, gauge: 2.0 * gauge * device.actuator.torque_constant
-    ),
+COMPARED = {
+    ANGLE: ComparedChannel("rad", "angle", "Vane angle"),
+    PRESSURE_1: ComparedChannel("Pa_d", "pressure change", "Pressure in chamber 1"),
+    PRESSURE_2: ComparedChannel("Pa_d", "pressure change", "Pressure in chamber 2"),
+    PRESSURE_DIFFERENCE: ComparedChannel("Pa_d", "pressure change", "Pressure difference"),
+    TORQUE: ComparedChannel("N m", "torque", "Actuator torque"),
 }
-"""Compared channels by name, with the full ranges of the paper: 110 deg, 55 psi, 55 psi and 110 psi.
+"""Compared channels by name."""
 
-The full range of the torque follows from equation (2). A pressure difference ranges from full supply on one side to
-full supply on the other.
-"""
+
+def full_range(name: str, device: Device, gauge: float) -> float:
+    """Return the full range of a channel [SI] for a gauge supply pressure [Pa]; in the paper 110 deg, 55 and 110 psi.
+
+    A pressure difference ranges from full supply on one side to full supply on the other, the torque by equation (2).
+    """
+    if name == ANGLE:
+        return device.actuator.angle_max - device.actuator.angle_min
+    both_ways = {PRESSURE_DIFFERENCE: 2.0, TORQUE: 2.0 * device.actuator.torque_constant}
+    return both_ways.get(name, 1.0) * gauge
+
+
+def usual_zero(name: str, device: Device) -> float:
+    """Return the usual zero error of a sensor, or its effect on a computed channel [SI unit of the channel]."""
+    # Pressure difference and torque have the zeros of both sensors, as their full ranges have both pressures.
+    return ANGLE_ERRORS.zero if name == ANGLE else full_range(name, device, PRESSURE_ERRORS.zero)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,10 +68,6 @@ class ErrorLimit:
 
     value: float
     is_fraction: bool
-
-    def fraction_of(self, full_range: float) -> float:
-        """Return the limit as a fraction [-] of a full range [SI unit of the channel]."""
-        return self.value if self.is_fraction else self.value / full_range
 
 
 def parse_thresholds(texts: Iterable[str] = ()) -> dict[str, ErrorLimit]:

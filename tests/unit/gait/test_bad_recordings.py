@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError
-from ppafo.gait.plausible import moment_remarks
+from ppafo.gait.plausible import stride_remarks
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.mapping import (
     load_map,
@@ -302,8 +302,9 @@ def test_a_hip_below_the_ground_is_a_sign_and_no_unit(opensim_files: dict[str, P
 
 def test_a_moment_that_hardly_shows_its_sign_is_remarked() -> None:
     curve = np.sin(np.linspace(0.0, 2.0 * np.pi, 101))
-    assert moment_remarks(np.maximum(curve, -0.1)) == []
-    (said,) = moment_remarks(np.maximum(curve, -0.8))
+    still = {"shank_angle": np.zeros(101), "ankle_angle": np.full(101, 0.5 * np.pi)}
+    assert stride_remarks({**still, "ankle_moment": np.maximum(curve, -0.1)}) == []
+    (said,) = stride_remarks({**still, "ankle_moment": np.maximum(curve, -0.8)})
     assert "1 N m/kg in plantarflexion and 0.8 N m/kg in dorsiflexion" in said
 
 

@@ -22,7 +22,7 @@ from ppafo.validation.candidates import Cause, of_sensors
 from ppafo.validation.causes import CauseSearch, Diagnosis, causes_of
 from ppafo.validation.measured import check_recording
 from ppafo.validation.record import ModelChange, record_of
-from ppafo.validation.settings import COMPARED, ReplaySettings
+from ppafo.validation.settings import ReplaySettings, usual_zero
 from scripts.known_faults import FAULTS, LOOPS, Fault, declared_faults, judged, moved, recorded, validated
 
 ROOM = 101325.0
@@ -430,7 +430,7 @@ def test_what_is_usual_on_a_bench_is_the_same_for_limits_causes_and_the_fit() ->
     usual, device = Tolerances(), load_device("ppafo2011", overrides=SUPPLY)
     by_name = {cause.name: cause.usual for cause in of_sensors(device, ["angle", "pressure_1", "pressure_2"], {})}
     for channel in ("angle", "pressure_1"):
-        assert by_name[f"zero of {channel}"] == usual.zero_of(channel) == COMPARED[channel].usual_zero(device)
+        assert by_name[f"zero of {channel}"] == usual.zero_of(channel) == usual_zero(channel, device)
     # A fit takes an angle sensor as exact where nothing is stated.
     assert by_name["gain of pressure_1"] == usual.gain_of("pressure_1")
 

@@ -21,10 +21,7 @@ from ppafo.gait.plausible import (
     MeanStride,
     check_plausible,
     check_side,
-    force_remarks,
-    moment_remarks,
-    sign_remarks,
-    zero_remarks,
+    stride_remarks,
 )
 from ppafo.gait.recorded.footfalls import (
     FORCE,
@@ -443,12 +440,10 @@ def _remarks(
     return [
         *(f"stride from {each.start:.4g} to {each.end:.4g} s left out: {why}" for each, why in strides.left_out),
         *(f"{name} covers {own} of {count} strides" for name in curves if (own := len(curves[name].strides)) < count),
-        *(force_remarks(means[FORCE]) if FORCE in means else [f"no vertical force{less}"]),
+        *([] if FORCE in means else [f"no vertical force{less}"]),
         *knee_remarks(source.columns.knee, walk, source.settings.stature),
-        *sign_remarks(means["shank_angle"], means["ankle_angle"]),
-        *(moment_remarks(means["ankle_moment"]) if "ankle_moment" in means else []),
         *([zero] if foot.terms is None else []),
-        *zero_remarks(means["shank_angle"], means["ankle_angle"]),
+        *stride_remarks(means),
         *(
             f"{message}: the data are noisy, or the walk is not steady"
             for _, message in _scatters(curves, errors, REMARKED_SPREAD, REMARKED_MISFIT)
