@@ -15,7 +15,7 @@ from ppafo.parameters.device import Device
 from ppafo.signals import Channel, Recording
 from ppafo.validation import parse_thresholds
 from ppafo.validation.measured import check_recording, read_measured
-from ppafo.validation.settings import parse_initial
+from ppafo.validation.settings import ErrorLimit, parse_initial
 
 Step = tuple[Device, Recording]
 HEADER = "time [s],command [-],angle [deg],pressure_1 [psi_g],pressure_2 [psi_g]"
@@ -163,9 +163,9 @@ def test_a_bad_threshold_is_refused(text: str, words: str) -> None:
 
 def test_thresholds_are_shares_or_errors_and_the_last_one_wins() -> None:
     thresholds = parse_thresholds(["5%", "angle=2.2 deg", "pressure_1=20%", "pressure_1=7 percent"])
-    assert thresholds[""].fraction_of(123.0) == 0.05
-    assert thresholds["pressure_1"].fraction_of(1e5) == pytest.approx(0.07)
-    assert thresholds["angle"].fraction_of(np.radians(110.0)) == pytest.approx(0.02)
+    assert thresholds[""] == ErrorLimit(0.05, is_fraction=True)
+    assert thresholds["pressure_1"] == ErrorLimit(pytest.approx(0.07), is_fraction=True)
+    assert thresholds["angle"] == ErrorLimit(pytest.approx(np.radians(2.2)), is_fraction=False)
     assert parse_thresholds() == {}
 
 
