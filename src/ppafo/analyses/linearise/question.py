@@ -46,8 +46,7 @@ def linearise(
     ['-0.21 1/s', '-0.97 1/s']
     """
     name_plugins(plugins)
-    from ppafo.analyses.linearise.answer import finding_of
-    from ppafo.analyses.linearise.model import linear_model
+    from ppafo.analyses.linearise.model import finding_of, linear_model
     from ppafo.simulation.loading import scenario_or_load
 
     return finding_of(linear_model(scenario_or_load(scenario, overrides), at))

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.analyses.linearise.answer import frequency_panels, steps_of
-from ppafo.analyses.linearise.model import LinearModel
+from ppafo.analyses.linearise.model import LinearModel, frequency_panels, steps_of
 from ppafo.analyses.linearise.question import linearise
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.engine.continuous_time import flows_at
