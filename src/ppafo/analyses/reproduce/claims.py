@@ -226,9 +226,7 @@ def _checked(entry: ClaimEntry, publication: PublicationFile, where: str) -> Cla
     if entry.arguments.keys() != takes.keys():
         given, known = ", ".join(entry.arguments) or "none", ", ".join(takes) or "none"
         hints = "".join(nearest_name(name, takes) for name in entry.arguments if name not in takes)
-        raise ScenarioError(
-            f"{where}.arguments: '{given}' must be the arguments of {entry.computation}: {known}{hints}"
-        )
+        raise ScenarioError(f"{where}.arguments: {entry.computation} takes {known}; given: {given}{hints}")
     values = dict[str, float]()
     for name, unit in takes.items():
         key, text = f"{where}.arguments.{name}", entry.arguments[name]
