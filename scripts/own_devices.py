@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ppafo.control.torque_loop import BOUNDARY, CONVERGENCE, OPENING, PROPORTIONAL_GAIN
+from ppafo.control.torque_loop import boundary_layer, convergence_rate, dead_zone_opening, proportional_gain
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import number_at
@@ -42,7 +42,7 @@ LAWS = (
 )
 FACTORS = (1.0, 0.125, 0.25, 0.5, 2.0, 4.0)
 """The rule's gain first, then those that it is compared with."""
-MAIN = (PROPORTIONAL_GAIN, BOUNDARY, CONVERGENCE, OPENING)
+MAIN = (proportional_gain, boundary_layer, convergence_rate, dead_zone_opening)
 """What sets how fast a law is; a wider boundary layer is a slower one."""
 METRICS = ("gas", "torque_error", "command_reversals", "peak_torque")
 ALLOWED_ERROR = 1.25
@@ -102,7 +102,7 @@ def main_gain(scenario: Scenario) -> tuple[str, bool]:
     """Path of the setting of a law that sets how fast it is, and whether a larger one is slower."""
     kind = WALKING_CONTROLLERS[scenario.controller.kind]
     item = next(item for item in kind.quantities if item.follows in MAIN)
-    return f"controller.{item.name}", item.follows == BOUNDARY
+    return f"controller.{item.name}", item.follows == boundary_layer
 
 
 def walk_law(law: str, device: RandomValue, seconds: float) -> Cell:

@@ -1,11 +1,10 @@
 """Scenarios in the text of a file that lies nowhere."""
 
 from collections.abc import Iterable
-from pathlib import Path
 
 from ppafo.errors import ScenarioError
 from ppafo.parameters.overrides import read_overrides
-from ppafo.simulation.document import ScenarioRequest
+from ppafo.simulation.document import DocumentReader
 from ppafo.simulation.loading import FILE, VANE, scenario_of
 from ppafo.simulation.scenario import Scenario
 
@@ -13,4 +12,4 @@ from ppafo.simulation.scenario import Scenario
 def parse_scenario(content: bytes, file: str, overrides: Iterable[str] = ()) -> Scenario:
     """Return the scenario in the bytes of a TOML file; ScenarioError or ParameterError for what cannot be used."""
     document, given = FILE.parse(content, file), read_overrides(overrides, ScenarioError)
-    return scenario_of(ScenarioRequest(file, file, Path(), document, given), VANE)
+    return scenario_of(DocumentReader(file, document, path=file, overrides=given), VANE)

@@ -86,7 +86,7 @@ def load_scenario(
             f"there is no scenario or walk '{label(name)}'{known_names(name, known)}, or give a .toml file"
         )
     request = of_vanes.request_of_file(path, read_overrides(overrides, ScenarioError), parameter_set, FILE)
-    return of_vanes.scenario_of(request, _layout(request.content))
+    return of_vanes.scenario_of(request, _layout(request.document))
 
 
 @checked
@@ -116,7 +116,7 @@ def scenario_from_dict(content: Mapping[str, Any], overrides: Overrides = (), *,
     """
     name_plugins(plugins)
     request = of_vanes.request_of_dict(content, overrides)
-    return of_vanes.scenario_of(request, _layout(request.content))
+    return of_vanes.scenario_of(request, _layout(request.document))
 
 
 def _layout(document: Mapping[str, Any]) -> of_vanes.Layout:
@@ -146,9 +146,9 @@ def reloaded(scenario: Scenario, more: Iterable[str]) -> Scenario:
     A Python object as its controller is kept.
     """
     before, custom = of_vanes.request_again(scenario.origin), scenario.controller.custom
-    layout, later = _layout(before.content), read_overrides(more, ScenarioError)
+    layout, later = _layout(before.document), read_overrides(more, ScenarioError)
     every = over_layer(
-        before.content, before.overrides, later, scenario.name, layout.content, scenario.device.valve_name
+        before.document, before.overrides, later, scenario.name, layout.content, scenario.device.valve_name
     )
     read = of_vanes.scenario_of(replace(before, overrides=every), layout)
     return read if custom is None else read.controlled_by(custom)
@@ -187,15 +187,15 @@ def usage_text(scenario: Scenario) -> str:
 def _changed_tables(scenario: Scenario) -> Iterator[str]:
     """Yield the TOML lines of file tables changed by the overrides of a scenario."""
     request = of_vanes.request_again(scenario.origin)
-    content = _layout(request.content).content
-    given, changed = (
-        override_document(request.content, overrides, request.file, content) for overrides in ((), request.overrides)
-    )
+    content = _layout(request.document).content
+    given, changed = (override_document(each, content) for each in (replace(request, overrides=()), request))
+    tables = dict(changed.document)
     if changed.device:
-        device = changed.document.setdefault("device", {})
+        device = tables.get("device", {})
         words = [override.words for override in changed.device]
-        device["overrides"] = list(over(device.get("overrides", ()), words, valve=scenario.device.valve_name))
-    for name, table in changed.document.items():
+        every = over(device.get("overrides", ()), words, valve=scenario.device.valve_name)
+        tables["device"] = {**device, "overrides": list(every)}
+    for name, table in tables.items():
         if table == given.document.get(name):
             continue
         yield from table_lines(name, table) if isinstance(table, Mapping) else assignments({name: table})

@@ -23,20 +23,6 @@ from typing import NamedTuple
 from ppafo.control.torque_loop import TorqueLoop, torque_in_dead_time
 from ppafo.model.elementary import power
 
-ANGLE_STIFFNESS = "stiffness of the angle loop"
-ANGLE_DAMPING = "damping of the angle loop"
-RATE_FILTER = "rate filter of the angle loop"
-INNER_GAIN = "inner gain of the angle loop"
-GRAVITY = "gravity torque of the joint"
-FRICTION = "friction of the joint in motion"
-STATIC_FRICTION = "static friction of the joint"
-INERTIA = "inertia of the joint"
-LOAD_TIME = "time constant of the observed load"
-TORQUE_LAG = "time constant of the torque loop"
-TOLERANCE = "tolerance of the angle"
-REST_DISTANCE = "angle change that counts as motion of the joint"
-"""Names of the parameters of the loop from which a setting may take its default; the functions below compute them."""
-
 OUTER_TIMES_INNER = 8.0
 """1/(w theta): four times the delay of the inner loop, which is two dead times."""
 

@@ -14,14 +14,6 @@ OPEN_LOOP = "constant"
 """Name of the controller without a reference: its recordings have no reference, and so no tracking error."""
 
 
-def nominal_term(name: str) -> str:
-    """Return the name of a device property from which a setting of a model-based law may take its default.
-
-    ``simulation.nominal`` computes the value of each property.
-    """
-    return f"nominal {name.replace('_', ' ')}"
-
-
 DEAD_BAND = Quantity(
     "dead_band",
     "",
@@ -29,7 +21,7 @@ DEAD_BAND = Quantity(
     None,
     0.0,
     0.99,
-    follows=nominal_term("dead_band"),
+    follows="dead_band",
 )
 BelievedBand = Annotated[float, DEAD_BAND]
 """Dead band of the valve [-] that a law compensates, by ``control.torque_loop.beyond_dead_band``."""

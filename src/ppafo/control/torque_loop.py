@@ -16,16 +16,6 @@ torque, R is the rate of that quantity, and its unit replaces N m.
 
 from typing import NamedTuple
 
-PROPORTIONAL_GAIN = "proportional gain of the torque loop"
-INTEGRAL_GAIN = "integral gain of the torque loop"
-INTEGRAL_RATE = "integral rate of the torque loop"
-BOUNDARY = "boundary layer of the torque loop"
-CONVERGENCE = "convergence rate of the torque loop"
-OPENING = "opening of the torque loop"
-DEAD_ZONE = "dead zone of the torque loop"
-RELEASE = "release of the torque loop"
-REACH = "torque reach of the device"
-"""Names of the parameters of the loop from which a setting may take its default; the functions below compute them."""
 LEAST_TORQUE = 5.0e-4
 """Smallest torque change within the dead time [N m] for which gains are computed; smaller ones use the same gains."""
 LARGEST_OPENING = 0.77

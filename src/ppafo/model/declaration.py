@@ -25,8 +25,8 @@ class Quantity:
     maximum: float = math.inf
     minimum_allowed: bool = True
     """False if the value must be above ``minimum``."""
-    follows: str = ""
-    """Name of the term added to the default: of ``control.kind``, or of a loop in ``control``."""
+    follows: "PlainFunction | str" = ""
+    """What is added to the default: a rule of a loop in ``control``, or the name of a number that a law believes."""
     words: tuple[str, ...] = ()
     """Words that a file may have in place of the number."""
     optional: bool = False

@@ -6,7 +6,6 @@ A gain is a 15-bit fraction and a right shift: ``(value * fraction >> 15) >> pla
 import math
 from typing import NamedTuple
 
-from ppafo.control.kind import nominal_term
 from ppafo.control.torque_loop import SHARPNESS
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
@@ -88,7 +87,7 @@ SETTINGS = (
         None,
         1.0e4,
         1.0e8,
-        follows=nominal_term("converter_range"),
+        follows="converter_range",
     ),
 )
 """Converter settings of an integer controller."""

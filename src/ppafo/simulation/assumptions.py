@@ -1,11 +1,11 @@
 """Assumptions of a scenario: values without a source, with the reason for each."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
+from dataclasses import replace
 
 from ppafo.errors import ScenarioError
 from ppafo.parameters.declaration import RELIEVING_PATH
 from ppafo.parameters.declared import value_at
-from ppafo.parameters.overrides import Override
 from ppafo.parameters.parameter_set import entry_text
 from ppafo.simulation.declaration import OF_A_VANE, SUPPLY_LINE, line_entries, quantities
 from ppafo.simulation.document import DocumentReader
@@ -20,14 +20,15 @@ _ASSUMED = "assumed"
 """Section of a file with a note for each assumed path."""
 
 
-def read_assumptions(
-    as_written: DocumentReader, reading: DocumentReader, hardware: Hardware, overrides: Iterable[Override]
-) -> tuple[Assumption, ...]:
-    """Return all assumptions with a value; the note of an overridden assumption states the value in ``as_written``.
+def read_assumptions(reading: DocumentReader, hardware: Hardware) -> tuple[Assumption, ...]:
+    """Return all assumptions with a value; the note of an overridden assumption states the value in the file.
 
     Raises ScenarioError for a path without a value.
     """
-    replaced = {override.typed for override in overrides}
+    replaced, as_written = (
+        {override.typed for override in reading.overrides},
+        replace(reading, document=reading.content),
+    )
     notes: Mapping[str, str] = reading.document.get(_ASSUMED, {})
     assumptions, unknown = [], []
     for path, note in notes.items():

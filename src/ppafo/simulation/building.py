@@ -35,11 +35,10 @@ from ppafo.simulation.declaration import (
     reference_settings,
 )
 from ppafo.simulation.default_gains import default_links
-from ppafo.simulation.document import REFERENCE_OF, DocumentReader, ScenarioRequest, controlled_in
+from ppafo.simulation.document import REFERENCE_OF, DocumentReader, controlled_in
 from ppafo.simulation.hardware import Hardware, device_error, read_device, read_hardware
 from ppafo.simulation.motion_kind import MOTIONS
 from ppafo.simulation.numbers import number_at
-from ppafo.simulation.overrides import OverriddenDocument
 from ppafo.simulation.profiles import read_profile, reference_problem
 from ppafo.simulation.scenario import (
     PRESSURE_WORDS,
@@ -62,20 +61,19 @@ _NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
 """Reference of a controller that follows none."""
 
 
-def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Scenario:
+def build_scenario(reading: DocumentReader) -> Scenario:
     """Return the scenario of a document whose keys have been checked.
 
     Raises ScenarioError or ParameterError for the first value that cannot be used.
     """
-    document = changed.document
-    reading = DocumentReader(request.file, document, changed.paths, request.text)
-    hardware = read_hardware(reading, request, changed.device)
+    document = reading.document
+    hardware = read_hardware(reading)
     device = read_device(reading, hardware)
     # Refusals are in the units of the set.
     with shown_in(device.shown):
         wrong = list[PpafoError]()
         with noted_in(wrong):
-            times = read_clock(reading)
+            duration, step, output_interval, period = read_clock(reading)
         with noted_in(wrong):
             of_sensors = reading.section("sensors", SENSORS)
         with noted_in(wrong):
@@ -87,23 +85,22 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         tolerance = reading.number("run.tolerance", ACCURACY)
         section = MOTIONS[kind_at(document, "motion")].section
         assert section is not None, "walks are built from another layout"
-        motion = section.read(reading, request.folder)
+        motion = section.read(reading, reading.folder)
         supply_line = read_supply_line(reading)
         kind = kind_at(document, "controller")
-        as_written = DocumentReader(request.file, request.content)
-        assumptions = read_assumptions(as_written, reading, hardware, request.overrides)
+        assumptions = read_assumptions(reading, hardware)
         scenario = Scenario(
             name=document["name"],
             description=document.get("description", ""),
             device=device,
-            run=RunSettings(times.duration, times.step, times.output_interval, tolerance),
+            run=RunSettings(duration, step, output_interval, tolerance),
             motion=motion,
             initial=initial,
-            controller=Control(kind, {}, times.period),
+            controller=Control(kind, {}, period),
             reference=reference,
             sensors=Sensors(**of_sensors, seed=int(reading.number("sensors.seed", SEED))),
             assumptions=(*assumptions, *assumed_lines(reading)),
-            origin=origin_of(request, changed, hardware),
+            origin=origin_of(reading, hardware),
             gas_model=read_gas_model(reading),
             supply_line=supply_line,
             links={**initial_links, **reference_links},
@@ -114,7 +111,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         scenario = with_settings(reading, scenario, law_settings(law, controlled))
         problem = reference_problem(scenario)
         if problem:
-            raise ScenarioError(f"{request.file}: {problem}")
+            raise ScenarioError(f"{reading.file}: {problem}")
         check_contradictions(scenario, reading)
         try:
             if supply_line is not None:
@@ -148,11 +145,11 @@ def check_regulated(device: Device, law: ControllerKind, controlled: str) -> Non
         )
 
 
-def origin_of(request: ScenarioRequest, changed: OverriddenDocument, hardware: Hardware) -> Origin:
+def origin_of(reading: DocumentReader, hardware: Hardware) -> Origin:
     """Return the origin of a scenario."""
-    overrides = tuple(override.words for override in request.overrides)
-    set_name, kept = changed.document["device"]["set"], "; ".join(filter(None, (hardware.replaced, changed.kept)))
-    return Origin(request.path, set_name, hardware.valve, overrides, request.content, kept)
+    overrides = tuple(override.words for override in reading.overrides)
+    set_name, kept = reading.document["device"]["set"], "; ".join(filter(None, (hardware.replaced, reading.kept)))
+    return Origin(reading.path, set_name, hardware.valve, overrides, reading.content, kept, hardware.parameter_set)
 
 
 def _initial(reading: DocumentReader, device: Device) -> tuple[Initial, Graph]:

@@ -10,7 +10,6 @@ from ppafo.parameters.graph import Graph, Link
 from ppafo.parameters.overrides import read_overrides
 from ppafo.simulation.declaration import PERIOD, RATE, RUN
 from ppafo.simulation.document import DocumentReader
-from ppafo.simulation.motion_kind import RunTimes
 from ppafo.simulation.overrides import override_document
 from ppafo.simulation.scenario import Scenario
 from ppafo.units.shown import shown_text
@@ -31,8 +30,8 @@ TIMES = (_DURATION_PATH, _STEP_PATH, _OUTPUT_PATH, _RATE_PATH, _PERIOD_PATH)
 """Paths that decide the clock of a run."""
 
 
-def read_clock(reading: DocumentReader) -> RunTimes:
-    """Return the times of a run [s]; the step is the largest divisor of the sample period up to the given step.
+def read_clock(reading: DocumentReader) -> tuple[float, float, float, float]:
+    """Return duration, step, output interval and sample period of a run [s]; the step divides the sample period.
 
     Without an output interval every step is recorded, or nearly every one if the steps do not divide the duration.
     Raises ScenarioError for contradictory times, and for too many steps.
@@ -76,7 +75,7 @@ def read_clock(reading: DocumentReader) -> RunTimes:
             f"recorded every {shown_text(output, 's', unit='s')} the run has {duration / output:.3g} samples, at most "
             f"{MAXIMUM_OUTPUTS:.0e} are allowed: increase {_OUTPUT_PATH}",
         )
-    return RunTimes(duration, used, output, period)
+    return duration, used, output, period
 
 
 def read_period(reading: DocumentReader, default: float = 0.0) -> tuple[float, str]:
@@ -135,34 +134,16 @@ def _not_above(reading: DocumentReader, path: str, value: float, limit: float, l
         raise reading.refusal(path, f"must not exceed {limit_text}")
 
 
-TimeTexts = Mapping[str, Mapping[str, Any]]
-"""Times of a scenario by section and name, as written in a file."""
-
-
-def clock_with(name: str, given: TimeTexts, times: Mapping[str, float]) -> RunTimes:
-    """Return the clock [s] of a run with other times, read like overrides of the scenario ``name``.
-
-    Raises ScenarioError if the times do not fit together.
-    """
-    document = {section: dict(texts) for section, texts in given.items()}
-    for path, value in times.items():
-        section, key = path.split(".")
-        # A rate takes the place of a period that the file has, and the reverse.
-        if section == "controller":
-            document[section] = {}
-        document[section][key] = f"{value!r} {'Hz' if path == _RATE_PATH else 's'}"
-    return read_clock(DocumentReader(name, document, frozenset(times)))
-
-
-def time_texts(base: Scenario) -> TimeTexts:
-    """Return the times as written in the scenario file, or as numbers if the scenario was changed after loading."""
-    document = override_document(base.origin.content, read_overrides(base.origin.overrides), base.name).document
+def time_texts(base: Scenario) -> dict[str, dict[str, Any]]:
+    """Return the times by section and name, as in the file, or as numbers if the scenario was changed after loading."""
+    given = DocumentReader(base.name, base.origin.content, overrides=read_overrides(base.origin.overrides))
+    document = override_document(given).document
     texts = {
         section: {name: value for name, value in document[section].items() if f"{section}.{name}" in TIMES}
         for section in ("run", "controller")
     }
     # The file speaks for the scenario only as long as nobody has changed its times in Python.
-    own = RunTimes(base.run.duration, base.run.step, base.run.output_interval, base.controller.period)
+    own = base.run.duration, base.run.step, base.run.output_interval, base.controller.period
     if read_clock(DocumentReader(base.name, texts)) == own:
         return texts
     run = {name: f"{getattr(base.run, name)!r} s" for name in ("duration", "step", "output_interval")}

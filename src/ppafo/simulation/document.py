@@ -1,7 +1,7 @@
-"""Document of a scenario: request to build from it, values by dotted path, conversion of a text with its unit to SI."""
+"""Document of a scenario: what it came with, values by dotted path, conversion of a text with its unit to SI."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -28,31 +28,28 @@ def controlled_in(document: Mapping[str, Any]) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class ScenarioRequest:
-    """Request to build a scenario.
-
-    ``file`` is the name of the scenario in messages, ``path`` the file, if there is one, ``folder`` the folder from
-    which relative paths start, and ``content`` the document as given. ``parameter_set`` replaces the parameter set that
-    the document names. ``text`` is the text of the file, for the lines in messages.
-    """
-
-    file: str
-    path: str | None
-    folder: Path
-    content: dict[str, Any]
-    overrides: tuple[Override, ...]
-    parameter_set: ParameterSet | None = None
-    text: str = ""
-
-
-@dataclass(frozen=True, slots=True)
 class DocumentReader:
-    """Document with its name in messages, ``file``, and its ``text``; ``overridden`` are the paths set by overrides."""
+    """Document of a scenario, with what it came with and what overrides made of it.
+
+    ``file`` is its name in messages, ``text`` the text of the file, for the lines in messages, ``path`` the file, if
+    there is one, ``folder`` the folder from which relative paths start. ``parameter_set`` replaces the parameter set
+    that the document names. After ``override_document``: ``content`` is the document as given, ``overridden`` are the
+    paths set by overrides, ``device`` the overrides of the device, not yet applied, ``kept`` is a sentence on the
+    numbers that a newly chosen ``kind`` keeps, else "", and ``wrong`` are the refusals of overrides.
+    """
 
     file: str
     document: Mapping[str, Any]
     overridden: frozenset[str] = frozenset()
     text: str = ""
+    path: str | None = None
+    folder: Path = Path()
+    overrides: tuple[Override, ...] = ()
+    parameter_set: ParameterSet | None = None
+    content: Mapping[str, Any] = field(default_factory=dict)
+    device: tuple[Override, ...] = ()
+    kept: str = ""
+    wrong: tuple[PpafoError, ...] = ()
 
     def quote(self, path: str) -> str:
         """Return file, key and value as given."""

@@ -13,7 +13,7 @@ from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import Asked, acting
 from ppafo.parameters.overrides import other_forms
 from ppafo.simulation.declaration import law_settings
-from ppafo.simulation.default_gains import GAIN_TERMS, SLOPE_GAINS, loop_parts
+from ppafo.simulation.default_gains import SLOPE_GAINS, is_gain, loop_parts
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
 from ppafo.units.shown import in_units, shown_text, written_text
@@ -75,7 +75,7 @@ def gains_of(scenario: Scenario) -> Gains | None:
     items = [
         quantity
         for quantity in law_settings(law, scenario.controlled)
-        if quantity.follows in GAIN_TERMS or (quantity.name in SLOPE_GAINS and settings[quantity.name])
+        if is_gain(quantity) or (quantity.name in SLOPE_GAINS and settings[quantity.name])
     ]
     if not items:
         return None

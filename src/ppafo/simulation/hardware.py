@@ -22,9 +22,7 @@ from ppafo.parameters.parameter_set import (
     links_of_set,
     units_of_texts,
 )
-from ppafo.simulation.document import DocumentReader, ScenarioRequest
-from ppafo.simulation.overrides import is_of_device
-from ppafo.simulation.scenario import Origin
+from ppafo.simulation.document import DocumentReader
 from ppafo.wording import one_line
 
 logger = logging.getLogger("ppafo")
@@ -46,21 +44,23 @@ class Hardware:
     replaced: str
 
 
-def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: tuple[Override, ...]) -> Hardware:
+def read_hardware(reading: DocumentReader) -> Hardware:
     """Return the parameter set with the overrides of the file, then those of the caller.
 
     Values of the file that replace those of another set or valve are logged. Raises ParameterError for unusable values.
     """
-    section, in_file = reading.document["device"], request.content.get("device", {})
+    section, in_file, overrides = reading.document["device"], reading.content.get("device", {}), reading.device
     valve = section.get("valve")
     try:
         of_file = read_overrides(section.get("overrides", ()))
         check_valve(of_file, in_file.get("valve"), f"device.valve = '{in_file.get('valve')}'")
-        plain_set = request.parameter_set or load_parameter_set(set_name(section["set"], request.folder))
+        plain_set = reading.parameter_set or load_parameter_set(set_name(section["set"], reading.folder))
         valve_name = chosen_valve(plain_set, valve)
         owner, replacing = "", tuple[Override, ...]()
         if section["set"] != in_file.get("set"):
-            of_file = _without_second_chamber(of_file, plain_set)
+            # Another set than the file's own may have one chamber only.
+            missing = OF_SECOND_CHAMBER if plain_set.has_one_chamber else ()
+            of_file = tuple(item for item in of_file if item.typed not in missing)
             owner, replacing = section["set"], of_file
         elif valve != in_file.get("valve"):
             owner = f"valve '{valve_name}'"
@@ -79,25 +79,7 @@ def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: 
     return Hardware(changed, valve_name, links_of_set(changed, overridden, before), replaced)
 
 
-def _without_second_chamber(overrides: tuple[Override, ...], parameter_set: ParameterSet) -> tuple[Override, ...]:
-    """Return the overrides of a file that apply to another set than its own, which may have one chamber only."""
-    missing = OF_SECOND_CHAMBER if parameter_set.has_one_chamber else ()
-    return tuple(item for item in overrides if item.typed not in missing)
-
-
 _warn_once = functools.lru_cache(maxsize=64)(logger.warning)
-
-
-def parameter_set_of(origin: Origin) -> ParameterSet:
-    """Return the parameter set of a scenario's device with its overrides. ParameterError if it cannot be read."""
-    folder = Path() if origin.file is None else Path(origin.file).parent
-    in_file = origin.content.get("device", {})
-    plain_set = load_parameter_set(set_name(origin.parameter_set, folder))
-    of_file = read_overrides(in_file.get("overrides", ()))
-    if origin.parameter_set != in_file.get("set"):
-        of_file = _without_second_chamber(of_file, plain_set)
-    of_caller = [override for override in read_overrides(origin.overrides) if is_of_device(override.typed)]
-    return with_overrides(with_overrides(plain_set, of_file, origin.valve), of_caller, origin.valve)
 
 
 def set_name(name: str, folder: Path) -> str:

@@ -16,10 +16,10 @@ from ppafo.parameters.declared import KIND, Content, layout_of, value_at
 from ppafo.parameters.overrides import FORMS, Override, either, in_two_forms, read_overrides
 from ppafo.simulation.building import build_scenario
 from ppafo.simulation.declaration import OF_A_VANE
-from ppafo.simulation.document import DocumentReader, ScenarioRequest
+from ppafo.simulation.document import DocumentReader
 from ppafo.simulation.hardware import read_hardware
 from ppafo.simulation.numbers import check_parts
-from ppafo.simulation.overrides import OverriddenDocument, override_document
+from ppafo.simulation.overrides import override_document
 from ppafo.simulation.scenario import Origin, Scenario
 from ppafo.wording import one_line, override_text
 
@@ -32,7 +32,7 @@ class Layout:
 
     file: TomlKind
     content: Content
-    build: Callable[[ScenarioRequest, OverriddenDocument], Scenario]
+    build: Callable[[DocumentReader], Scenario]
 
 
 VANE = Layout(FILE, OF_A_VANE, build_scenario)
@@ -66,12 +66,18 @@ def request_of_file(
     overrides: tuple[Override, ...] = (),
     parameter_set: ParameterSet | None = None,
     file: TomlKind = FILE,
-) -> ScenarioRequest:
+) -> DocumentReader:
     """Return the request for the scenario of a file."""
     name, content = label(str(name_or_path)), file.read(name_or_path)
     document, text = FILE.parse(content, name), decoded(content)
-    return ScenarioRequest(
-        name, str(name_or_path), Path(name_or_path).parent, document, overrides, parameter_set, text=text
+    return DocumentReader(
+        name,
+        document,
+        text=text,
+        path=str(name_or_path),
+        folder=Path(name_or_path).parent,
+        overrides=overrides,
+        parameter_set=parameter_set,
     )
 
 
@@ -100,7 +106,7 @@ def scenario_from_dict(content: Mapping[str, Any], overrides: Iterable[str] = ()
     return scenario_of(request_of_dict(content, overrides), VANE)
 
 
-def request_of_dict(content: Mapping[str, Any], overrides: Iterable[str]) -> ScenarioRequest:
+def request_of_dict(content: Mapping[str, Any], overrides: Iterable[str]) -> DocumentReader:
     """Return the request for a scenario of nested dictionaries; ScenarioError for other data or too deep nesting."""
     if not isinstance(content, Mapping):
         raise ScenarioError(f"a scenario must be a dictionary like a scenario file, not a {type(content).__name__}")
@@ -108,14 +114,15 @@ def request_of_dict(content: Mapping[str, Any], overrides: Iterable[str]) -> Sce
     FILE.check_depth(content, file)
     # A copy: the scenario is loaded anew from it, whatever becomes of the caller's dictionaries.
     document = copy.deepcopy(dict(content))
-    return ScenarioRequest(file, None, Path(), document, read_overrides(overrides, ScenarioError))
+    return DocumentReader(file, document, overrides=read_overrides(overrides, ScenarioError))
 
 
-def request_again(origin: Origin) -> ScenarioRequest:
+def request_again(origin: Origin) -> DocumentReader:
     """Return the request from which a scenario was built."""
     file, content = origin.file, origin.content
     name, folder = (_name_in_messages(content), Path()) if file is None else (label(file), Path(file).parent)
-    return ScenarioRequest(name, file, folder, content, read_overrides(origin.overrides, ScenarioError))
+    overrides = read_overrides(origin.overrides, ScenarioError)
+    return DocumentReader(name, content, path=file, folder=folder, overrides=overrides)
 
 
 def _name_in_messages(content: Mapping[str, Any]) -> str:
@@ -124,35 +131,34 @@ def _name_in_messages(content: Mapping[str, Any]) -> str:
     return f"scenario '{label(name)}'" if isinstance(name, str) else "scenario"
 
 
-def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
+def scenario_of(request: DocumentReader, layout: Layout) -> Scenario:
     """Check the keys of the file itself, apply the overrides, then check that all required keys are given."""
+    file, given, content = request.file, request.document, layout.content
     # A set in the place of a scenario would else be refused key by key.
-    if "default_valve" in request.content and not {"run", "controller"} & request.content.keys():
-        of_set = (f"device.set={request.file}", f"device.valve={one_line(request.content['default_valve'])}")
-        raise ScenarioError(f"{request.file}: is a parameter set, not a scenario; {override_text(of_set)} takes it")
-    file, content = request.file, layout.content
+    if "default_valve" in given and not {"run", "controller"} & given.keys():
+        of_set = (f"device.set={file}", f"device.valve={one_line(given['default_valve'])}")
+        raise ScenarioError(f"{file}: is a parameter set, not a scenario; {override_text(of_set)} takes it")
     # Faults of the file itself are said as such; an override may give a value that it lacks.
-    _check_layout(request.content, request, content, may_have_gaps=bool(request.overrides))
-    changed = override_document(request.content, request.overrides, file, content)
-    if wrong := list(changed.wrong):
+    _check_layout(request, content, may_have_gaps=bool(request.overrides))
+    reading = override_document(request, content)
+    if wrong := list(reading.wrong):
         # A kind that is not known has no values: where one is given, it is the mistake.
-        _check_layout(changed.document, request, content, of_kinds_alone=True)
+        _check_layout(reading, content, of_kinds_alone=True)
         with noted_in(wrong):
-            if value_at(changed.document, "device.set") is not None:
-                read_hardware(DocumentReader(file, changed.document), request, changed.device)
+            if value_at(reading.document, "device.set") is not None:
+                read_hardware(reading)
         raise_noted(wrong)
     if request.overrides:
-        _check_layout(changed.document, request, content)
-    paths = [f"{section}.{name}" for section in FORMS for name in value_at(changed.document, section) or ()]
+        _check_layout(reading, content)
+    paths = [f"{section}.{name}" for section in FORMS for name in value_at(reading.document, section) or ()]
     pair = in_two_forms(paths)
     if pair is not None:
-        raise DocumentReader(file, changed.document, changed.paths, request.text).refusal(pair[1], either(pair[1]))
-    return layout.build(request, changed)
+        raise reading.refusal(pair[1], either(pair[1]))
+    return layout.build(reading)
 
 
 def _check_layout(
-    document: dict[str, Any],
-    request: ScenarioRequest,
+    reading: DocumentReader,
     content: Content,
     may_have_gaps: bool = False,
     of_kinds_alone: bool = False,
@@ -161,11 +167,11 @@ def _check_layout(
 
     Beside these, numbers that cannot be read are named. With ``of_kinds_alone`` only an unknown ``kind`` is an error.
     """
-    file = request.file
+    file, document = reading.file, reading.document
 
     def place(path: str) -> str:
-        is_of_file = value_at(document, path) == value_at(request.content, path)
-        return line_of(request.text, path) if is_of_file else ""
+        is_of_file = value_at(document, path) == value_at(reading.content or document, path)
+        return line_of(reading.text, path) if is_of_file else ""
 
     with refused_as(ScenarioError, file, KindError):
         fields = content.declare(document)

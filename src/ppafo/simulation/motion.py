@@ -22,7 +22,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters.declared import kind_at, value_at
 from ppafo.signals.meter import LED_SHANK
 from ppafo.signals.meter import WALK as OF_WALK
-from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, clock_with, time_texts
+from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, read_clock, time_texts
 from ppafo.simulation.contradictions import Contradiction
 from ppafo.simulation.declaration import (
     ANGLE,
@@ -39,7 +39,7 @@ from ppafo.simulation.declaration import (
 )
 from ppafo.simulation.document import DocumentReader
 from ppafo.simulation.leg import measured_leg, on_gait, plan_leg
-from ppafo.simulation.motion_kind import VANE, LawSignals, MotionKind, MotionSection, ProfileTable, RunTimes
+from ppafo.simulation.motion_kind import VANE, LawSignals, MotionKind, MotionSection, ProfileTable
 from ppafo.simulation.numbers import path_of_locked_angle
 from ppafo.simulation.plan import plan_vane
 from ppafo.simulation.profiles import (
@@ -114,24 +114,30 @@ def _beyond(scenario: Scenario, limits: Limits, profile: ProfileChoice, section:
     return outside, lambda run: problems[run]
 
 
-def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[RunTimes, tuple[Problem, ...]]:
-    """Return the run times for columns of times [s] by path, and the problems of contradictory times.
+def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Problem, ...]]:
+    """Return the times of runs [s] by path for columns of times [s], and the problems of contradictory times.
 
-    Times are read as in a file, once for each combination, of which an ensemble has few.
+    Times are read as overrides of a file, once for each combination, of which an ensemble has few.
     """
-    texts = time_texts(base)
+    texts, changed = time_texts(base), [path.split(".") for path in times]
     combinations, index_of_run = np.unique(np.stack(list(times.values()), axis=1), axis=0, return_inverse=True)
     index_of_run = index_of_run.reshape(-1)
     reasons, table = [""] * len(combinations), np.full((len(combinations), 4), np.nan)
+    # A rate takes the place of a period that the file has, and the reverse.
+    texts |= {section: {} for section, _ in changed if section == "controller"}
     for index, combination in enumerate(combinations.tolist()):
+        document = {section: dict(written) for section, written in texts.items()}
+        for (section, name), value in zip(changed, combination, strict=True):
+            document[section][name] = f"{value!r} {'Hz' if name == 'rate' else 's'}"
         try:
-            run_times = clock_with(base.name, texts, dict(zip(times, combination, strict=True)))
+            table[index] = read_clock(DocumentReader(base.name, document, frozenset(times)))
         except ScenarioError as error:
             reasons[index] = str(error)
-        else:
-            table[index] = run_times.duration, run_times.step, run_times.output_interval, run_times.period
     is_refused = np.array([bool(reason) for reason in reasons])[index_of_run]
-    return RunTimes(*table[index_of_run].T.copy()), ((is_refused, lambda run: reasons[index_of_run[run]]),)
+    columns = zip(
+        ("run.duration", "run.step", "run.output_interval", "controller.period"), table[index_of_run].T, strict=True
+    )
+    return {path: column.copy() for path, column in columns}, ((is_refused, lambda run: reasons[index_of_run[run]]),)
 
 
 def lacks(scenario: Scenario, kind: MetricKind) -> str:

@@ -26,16 +26,6 @@ VANE_MOTIONS = ("free", "locked", "prescribed", "leg")
 _GROUP = "ppafo.motions"
 
 
-@dataclass(frozen=True, slots=True)
-class RunTimes:
-    """Duration, longest step, output interval and sample period [s]; the step divides the sample period."""
-
-    duration: float
-    step: float
-    output_interval: float
-    period: float
-
-
 class LawSignals(NamedTuple):
     """Signals of a controller: the joint whose controlled quantity it sees.
 
@@ -64,7 +54,7 @@ class MotionKind:
     - ``measured``: recording and metrics of a run, from its rows (samples,) by path at times [s]
     - ``contradictions``: the checks of numbers that could contradict each other (``simulation/contradictions.py``)
     - ``quantities``: declarations of all numbers of a scenario except those of its device, by path
-    - ``clock``: the clock with other times [s], by path, and the problems of contradictory times
+    - ``clock``: the times of runs [s] with other times, both by path, and the problems of contradictory times
     - ``flaws``: settings of the sensors, of which each, in one program, is 0 for all runs or for none
     - ``law``: catalogue entry of the controller, extended for this motion
     - ``asks_gradually``: of a law, True if it commands partial valve openings to follow what it tracks
@@ -80,7 +70,7 @@ class MotionKind:
     measured: "Callable[[Any, Run, Floats, Mapping[str, Floats]], Measured]"
     contradictions: Callable[[Any], Iterable[Any]]
     quantities: Callable[[Any], dict[str, Quantity]]
-    clock: "Callable[[Any, Mapping[str, Any]], tuple[RunTimes, tuple[Problem, ...]]]"
+    clock: "Callable[[Any, Mapping[str, Any]], tuple[dict[str, Any], tuple[Problem, ...]]]"
     flaws: Callable[[Any], tuple[Any, ...]]
     law: "Callable[[Any], ControllerKind]"
     asks_gradually: "Callable[[ControllerKind], bool]"

@@ -7,7 +7,7 @@ a file, is a layer below the caller's overrides: choosing another ``kind`` drops
 import copy
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 from ppafo.errors import KindError, PpafoError, ScenarioError, noted_in, refused_as
@@ -19,6 +19,7 @@ from ppafo.parameters.declaration import quantities as device_quantities
 from ppafo.parameters.declared import KIND, Content, quantities_in, value_at
 from ppafo.parameters.overrides import Override, check_valve, layered, of_another_valve, other_forms, override_set
 from ppafo.simulation.declaration import OF_A_VANE
+from ppafo.simulation.document import DocumentReader
 from ppafo.units import SI
 from ppafo.wording import nearest_name, number_text
 
@@ -29,32 +30,16 @@ _SAMPLING = ("rate", "period")
 """Keys of a controller for every value of ``kind``."""
 
 
-@dataclass(frozen=True, slots=True)
-class OverriddenDocument:
-    """Document with its own overrides applied at ``paths``, and the overrides of the device, not yet applied.
-
-    ``kept`` is a sentence on the numbers of the document that a newly chosen ``kind`` keeps, else "". ``wrong`` are the
-    refusals of overrides that were not applied.
-    """
-
-    document: dict[str, Any]
-    paths: frozenset[str]
-    device: tuple[Override, ...]
-    kept: str
-    wrong: tuple[PpafoError, ...]
-
-
-def override_document(
-    document: Mapping[str, Any], overrides: Iterable[Override], file: str, content: Content = OF_A_VANE
-) -> OverriddenDocument:
-    """Return a changed copy of a document; ``file`` is the document's name in messages.
+def override_document(request: DocumentReader, content: Content = OF_A_VANE) -> DocumentReader:
+    """Return a document with its overrides applied.
 
     Naming another kind of motion, controller or profile drops the settings of the document that only the old
     kind has; giving a rate drops its period, and vice versa. A gain on the torque, or one of 0, may omit its unit.
     A path that is neither declared nor of the device is among what is ``wrong``. Raises ScenarioError for an override
     that another one makes useless.
     """
-    override_at = override_set(overrides, ScenarioError, content.same)
+    document, file = request.document, request.file
+    override_at = override_set(request.overrides, ScenarioError, content.same)
     if _VALVE in override_at:
         valve = override_at[_VALVE]
         check_valve(override_at.values(), valve.text, f"override '{valve}'", ScenarioError)
@@ -76,7 +61,15 @@ def override_document(
             with noted_in(wrong):
                 _set(changed, path, own[path].text, file, content)
     kept = _kept_text(document, changed, own, content)
-    return OverriddenDocument(changed, frozenset(own), tuple(of_device.values()), kept, tuple(wrong))
+    return replace(
+        request,
+        document=changed,
+        content=document,
+        overridden=frozenset(own),
+        device=tuple(of_device.values()),
+        kept=kept,
+        wrong=tuple(wrong),
+    )
 
 
 def _unknown(own: Mapping[str, Override], path: str, known: tuple[str, ...], file: str) -> ScenarioError:

@@ -24,6 +24,7 @@ from ppafo.simulation.motion_kind import MOTIONS, WALK, MotionKind
 if TYPE_CHECKING:
     from ppafo.control.kind import ControllerKind
     from ppafo.model.regulator import SupplyLines
+    from ppafo.parameters import ParameterSet
 
 PYTHON_CONTROLLER = "python"
 LARGEST_SEED = 2**32 - 1
@@ -349,15 +350,16 @@ class Origin:
     """Origin of a scenario: file, parameter set, valve, overrides and the document of the file.
 
     ``replaced`` is a sentence on values of the file that replace values of another set, or that the file gives for
-    another ``kind``, else "".
+    another ``kind``, else "". ``parameters`` is the set with all overrides.
     """
 
     file: str | None
     parameter_set: str
     valve: str
     overrides: tuple[str, ...]
-    content: dict[str, Any]
+    content: Mapping[str, Any]
     replaced: str = ""
+    parameters: "ParameterSet | None" = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -14,7 +14,6 @@ from ppafo.parameters.declaration import fits, is_within, range_rule
 from ppafo.parameters.declared import PLAIN
 from ppafo.parameters.graph import counts_from, gauge_link
 from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si, in_first_unit, unit_in
-from ppafo.simulation.hardware import parameter_set_of
 from ppafo.simulation.numbers import NOISE_SEED, declared_numbers, number_at
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.studies.declaration import KINDS
@@ -209,7 +208,8 @@ def stated_normal(varied: VariedPath, scenario: Scenario) -> tuple[Distribution,
     """Return the stated distribution of a path and its unit in the parameter set; UnitError without an uncertainty."""
     origin, path = scenario.origin, varied.path
     # With the overrides of the scenario: one that replaces a value takes its uncertainty away.
-    parameters = parameter_set_of(origin)
+    parameters = origin.parameters
+    assert parameters is not None, "read from a file"
     inside = f"valves.{origin.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
     entry = parameters.numbers.get(inside)
     if entry is None or not entry.uncertainty:

@@ -22,12 +22,12 @@ from ppafo.simulation.building import origin_of, read_gas_model, read_supply_lin
 from ppafo.simulation.clock import read_period
 from ppafo.simulation.contradictions import check_contradictions
 from ppafo.simulation.declaration import SUPPLY_LINE
-from ppafo.simulation.document import DocumentReader, ScenarioRequest
+from ppafo.simulation.document import DocumentReader
 from ppafo.simulation.hardware import read_device, read_hardware
 from ppafo.simulation.loading import FILE as SCENARIO_FILE
 from ppafo.simulation.loading import Layout, list_scenarios, request_again, request_of_file, scenario_of
 from ppafo.simulation.motion_kind import WALK
-from ppafo.simulation.overrides import OverriddenDocument, over_layer
+from ppafo.simulation.overrides import over_layer
 from ppafo.simulation.scenario import Assumption, Control, Initial, RunSettings, Scenario, Sensors
 from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, read_bottle
 from ppafo.walking.declaration import DURATION, FORCES, OF_A_WALK, SEED, STEP, WALK_SENSORS
@@ -43,26 +43,25 @@ DEFAULT_DURATION, BOTTLE_DURATION = 60.0, 600.0
 """Default duration of a walk [s], and of a walk on a bottle, which may end it earlier."""
 
 
-def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenario:
+def build_walk(reading: DocumentReader) -> Scenario:
     """Return the walk described by a document whose keys have been validated.
 
     Raises ScenarioError, ParameterError or DataError for the first value that cannot be used.
     """
-    document = changed.document
-    reading = DocumentReader(request.file, document, changed.paths, request.text)
-    hardware = read_hardware(reading, request, changed.device)
+    document = reading.document
+    hardware = read_hardware(reading)
     device = read_device(reading, hardware)
-    with refused_as(ParameterError, f"{request.file}: [device]", ParameterError):
+    with refused_as(ParameterError, f"{reading.file}: [device]", ParameterError):
         device.check_pressurised("a walk, whose controllers fill the chambers,")
         if VALVES[device.valve.kind].regulation is not None:
             raise ParameterError(
                 f"device.valve = '{device.valve_name}' regulates pressures, whose flow fixed steps of a walk do not "
                 "resolve; set it to a proportional valve or a pair of on/off valves"
             )
-    bottle = read_bottle(reading, device, request.folder)
+    bottle = read_bottle(reading, device)
     if bottle is not None:
         # A bottle always feeds lines, by default those of the declarations.
-        document.setdefault(SUPPLY_LINE, {})
+        reading = replace(reading, document={SUPPLY_LINE: {}, **document})
     line = read_supply_line(reading)
     if line is not None and bottle is not None:
         line = bottle.fed(line)
@@ -70,7 +69,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     name, is_named = document.get("gait", NORMATIVE), "gait" in document
     # A relative path starts in the folder of the document.
     with refused_as(DataError, reading.quote("gait"), DataError):
-        gait = load_gait(request.folder / name if Path(name).suffix == ".toml" else name)
+        gait = load_gait(reading.folder / name if Path(name).suffix == ".toml" else name)
     motion = WalkMotion(
         kind=kind_at(document, "motion") or WALK,
         gait=gait,
@@ -103,7 +102,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
             seed=int(reading.number("sensors.seed", SEED)),
         ),
         assumptions=tuple(assumptions.values()),
-        origin=origin_of(request, changed, hardware),
+        origin=origin_of(reading, hardware),
         gas_model=read_gas_model(reading),
         supply_line=line,
     )
@@ -209,7 +208,7 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
             f"{scenario.name}: this walk differs from its file (the walk, the file or the package was changed after "
             f"loading): give {argument_text('bottle')} when loading the walk"
         )
-    content, before = request.content, request.overrides
+    content, before = request.document, request.overrides
     if bottle is not None:
         # Another bottle replaces the whole section, including its overrides.
         content = {name: section for name, section in content.items() if name != BOTTLE}
@@ -218,7 +217,7 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
     texts = [text if text.startswith(prefix) else f"{prefix}{text}" for text in overrides]
     texts += [] if bottle is None else [f"{BOTTLE_NAME}={from_here(bottle)}"]
     combined = over_layer(content, before, read_overrides(texts, ScenarioError), scenario.name, WALKING.content)
-    return scenario_of(replace(request, content=content, overrides=combined), WALKING)
+    return scenario_of(replace(request, document=content, overrides=combined), WALKING)
 
 
 def _without_bottle(scenario: Scenario) -> tuple[Any, ...]:

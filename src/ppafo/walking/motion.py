@@ -15,7 +15,7 @@ from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declared import quantities_in
 from ppafo.simulation.declaration import THERMAL
-from ppafo.simulation.motion_kind import MOTIONS, MotionKind, RunTimes
+from ppafo.simulation.motion_kind import MOTIONS, MotionKind
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.bottle.supply import BottleSupply
 from ppafo.walking.declaration import FORCES, declared
@@ -121,16 +121,16 @@ def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
     return ((np.logical_not(fits), line),)
 
 
-def clock_with(scenario: Scenario, times: Mapping[str, Any]) -> tuple[RunTimes, tuple[Problem, ...]]:
-    """Return the clock of a walk with other times [s], given by path, and the problems of these times.
+def clock_with(scenario: Scenario, times: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Problem, ...]]:
+    """Return the times of a walk [s] with other times [s], both by path, and the problems of these times.
 
     The times may be arrays (runs,).
     """
-    duration = times.get("run.duration", scenario.run.duration)
-    period = times.get("controller.period", scenario.controller.period)
+    clock = {path: time for path, time in times.items() if path != "controller.rate"}
     # A rate is another word for the period, and stands in its place.
     if "controller.rate" in times:
-        period = 1.0 / times["controller.rate"]
-    output = over_runs(record_interval, duration) if "run.duration" in times else scenario.run.output_interval
-    problems = duration_problems(scenario, duration) if "run.duration" in times else ()
-    return RunTimes(duration, times.get("run.step", scenario.run.step), output, period), problems
+        clock["controller.period"] = 1.0 / times["controller.rate"]
+    if "run.duration" not in times:
+        return clock, ()
+    clock["run.output_interval"] = over_runs(record_interval, times["run.duration"])
+    return clock, duration_problems(scenario, times["run.duration"])

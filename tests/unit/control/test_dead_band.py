@@ -5,8 +5,7 @@ import pytest
 import ppafo
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.controllers.switching import CONSTANT, ON_OFF
-from ppafo.control.kind import nominal_term
-from ppafo.control.torque_loop import OPENING
+from ppafo.control.torque_loop import dead_zone_opening
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.walking.loading import load_walk
 
@@ -24,7 +23,7 @@ def test_every_law_that_asks_for_openings_follows_the_dead_band_of_its_valve() -
     for name, kind in laws.items():
         follows = {quantity.name: quantity.follows for quantity in kind.quantities}
         # The opening of a law with a dead zone is a number that has the band in it.
-        assert nominal_term("dead_band") == follows.get("dead_band") or follows.get("opening") == OPENING, name
+        assert follows.get("dead_band") == "dead_band" or follows.get("opening") == dead_zone_opening, name
 
 
 @pytest.mark.parametrize("kind", ["pid", "sliding_mode", "pid_fixed_point"])

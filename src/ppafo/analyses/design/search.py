@@ -21,7 +21,7 @@ from ppafo.analyses.design.problem import SizingProblem
 from ppafo.analyses.endurance.discharge import TIME_IS_UP, discharge
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.torque_loop import PROPORTIONAL_GAIN
+from ppafo.control.torque_loop import proportional_gain
 from ppafo.documents.json_text import fields_of
 from ppafo.errors import ParameterError, StudyError
 from ppafo.parameters.bottles.bottle import Bottle
@@ -32,12 +32,11 @@ from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, COLOURS, REFERENCE
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
-from ppafo.simulation.default_gains import gain_links
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.motion_kind import LawSignals
 from ppafo.simulation.numbers import NOISE_SEED, number_at, with_numbers
 from ppafo.simulation.simulate import simulate
-from ppafo.simulation.torque_loop import LoopParts
+from ppafo.simulation.torque_loop import LoopLink, LoopParts
 from ppafo.simulation.tracking import REVERSALS, most_reversals
 from ppafo.simulation.tracking.rule import command_turning
 from ppafo.storage.comma_separated import marked_csv_bytes
@@ -303,11 +302,11 @@ class Trials:
             for path, number in valve.items()
         }
         columns |= {"supply.pressure": pressure, "supply.dorsiflexion_pressure": pressure}
-        links = gain_links(LoopParts(scenario.device, LawSignals()), CONTROLLERS[scenario.controller.kind])
+        parts = LoopParts(scenario.device, LawSignals())
+        link = LoopLink((), proportional_gain, groups=("loop",), parts=parts)
 
         def rule_gain(changed: Mapping[str, Floats]) -> Any:
-            number = links[PROPORTIONAL_GAIN].number
-            return number(lambda path: changed[path] if path in changed else number_at(scenario, path))
+            return link.number(lambda path: changed[path] if path in changed else number_at(scenario, path))
 
         gain_ratio = rule_gain(columns) / rule_gain({}) if problem.gains else 1.0
         for index, path in enumerate(problem.gains):

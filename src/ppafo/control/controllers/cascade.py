@@ -9,19 +9,19 @@ import math
 from typing import Annotated, NamedTuple
 
 from ppafo.control.angle_loop import (
-    ANGLE_DAMPING,
-    ANGLE_STIFFNESS,
-    FRICTION,
-    GRAVITY,
-    INERTIA,
-    INNER_GAIN,
-    LOAD_TIME,
-    RATE_FILTER,
-    REST_DISTANCE,
     REST_RATE,
-    STATIC_FRICTION,
-    TOLERANCE,
-    TORQUE_LAG,
+    angle_damping,
+    angle_stiffness,
+    friction,
+    gravity,
+    inertia,
+    inner_gain,
+    load_time,
+    rate_filter,
+    rest_distance,
+    static_friction,
+    tolerance,
+    torque_lag,
 )
 from ppafo.control.kind import BelievedBand, ControllerKind
 from ppafo.control.torque_loop import beyond_dead_band
@@ -61,40 +61,40 @@ class CascadeParameters(NamedTuple):
         ),
     ]
     angle_stiffness: Annotated[
-        float, Number("N m/rad", "torque per angle error", None, 0.0, 1.0e6, follows=ANGLE_STIFFNESS)
+        float, Number("N m/rad", "torque per angle error", None, 0.0, 1.0e6, follows=angle_stiffness)
     ]
     angle_damping: Annotated[
-        float, Number("N m s/rad", "torque per rate of the angle error", None, 0.0, 1.0e6, follows=ANGLE_DAMPING)
+        float, Number("N m s/rad", "torque per rate of the angle error", None, 0.0, 1.0e6, follows=angle_damping)
     ]
     load_time: Annotated[
-        float, Number("s", "time constant of the observed load, 0 for none", None, 0.0, 1.0e3, follows=LOAD_TIME)
+        float, Number("s", "time constant of the observed load, 0 for none", None, 0.0, 1.0e3, follows=load_time)
     ]
     rate_filter: Annotated[
-        float, Number("s", "time constant of the filter on the angle's rate", None, 0.0, 10.0, follows=RATE_FILTER)
+        float, Number("s", "time constant of the filter on the angle's rate", None, 0.0, 10.0, follows=rate_filter)
     ]
     torque_lag: Annotated[
-        float, Number("s", "believed time constant of the torque loop", None, 1.0e-6, 10.0, follows=TORQUE_LAG)
+        float, Number("s", "believed time constant of the torque loop", None, 1.0e-6, 10.0, follows=torque_lag)
     ]
-    torque_gain: Annotated[float, Number("1/(N m)", "command per torque error", None, 0.0, 1.0e3, follows=INNER_GAIN)]
+    torque_gain: Annotated[float, Number("1/(N m)", "command per torque error", None, 0.0, 1.0e3, follows=inner_gain)]
     tolerance: Annotated[
         float,
-        Number("rad", "angle error below which the observed load is not updated", None, 0.0, 1.0, follows=TOLERANCE),
+        Number("rad", "angle error below which the observed load is not updated", None, 0.0, 1.0, follows=tolerance),
     ]
     rest_distance: Annotated[
         float,
-        Number("rad", "angle change that counts as motion of the joint", None, 1.0e-9, 1.0, follows=REST_DISTANCE),
+        Number("rad", "angle change that counts as motion of the joint", None, 1.0e-9, 1.0, follows=rest_distance),
     ]
     gravity_torque: Annotated[
-        float, Number("N m", "believed largest gravity torque, 0 for none", None, -1.0e4, 1.0e4, follows=GRAVITY)
+        float, Number("N m", "believed largest gravity torque, 0 for none", None, -1.0e4, 1.0e4, follows=gravity)
     ]
     static_torque: Annotated[
-        float, Number("N m", "believed static friction, 0 for none", None, 0.0, 1.0e4, follows=STATIC_FRICTION)
+        float, Number("N m", "believed static friction, 0 for none", None, 0.0, 1.0e4, follows=static_friction)
     ]
     friction_torque: Annotated[
-        float, Number("N m", "believed friction in motion, 0 for none", None, 0.0, 1.0e4, follows=FRICTION)
+        float, Number("N m", "believed friction in motion, 0 for none", None, 0.0, 1.0e4, follows=friction)
     ]
     inertia: Annotated[
-        float, Number("kg m^2", "believed inertia about the joint, 0 for none", None, 0.0, 1.0e3, follows=INERTIA)
+        float, Number("kg m^2", "believed inertia about the joint, 0 for none", None, 0.0, 1.0e3, follows=inertia)
     ]
     dead_band: BelievedBand
 

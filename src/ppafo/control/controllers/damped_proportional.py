@@ -6,7 +6,7 @@ Units are given for a torque; where another quantity is controlled, read its uni
 from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import DEAD_BAND, ControllerKind
-from ppafo.control.torque_loop import PROPORTIONAL_GAIN, beyond_dead_band
+from ppafo.control.torque_loop import beyond_dead_band, proportional_gain
 from ppafo.model.controlled import ANYTHING, OF_TORQUE, ErrorFunctions, seen_value
 from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.sensors import Measurement
@@ -18,7 +18,7 @@ class DampedGains(NamedTuple):
     """Gain [1/(N m)], damping [s/(N m)], time constant of its filter [s]."""
 
     proportional_gain: Annotated[
-        float, Number("1/(N m)", "command per torque error", None, 0.0, 1.0e3, follows=PROPORTIONAL_GAIN)
+        float, Number("1/(N m)", "command per torque error", None, 0.0, 1.0e3, follows=proportional_gain)
     ]
     damping: Annotated[float, Number("s/(N m)", "command per rate of the torque, against it", 0.0, 0.0, 1.0e3)]
     damping_filter: Annotated[float, Number("s", "time constant of the filter on the torque's rate", 0.001, 0.0, 10.0)]

@@ -8,8 +8,8 @@ import math
 from typing import Annotated, NamedTuple
 
 from ppafo.control.controllers.pid import PidGains, PidState, pid_command, pid_restart
-from ppafo.control.kind import BelievedBand, ControllerKind, nominal_term
-from ppafo.control.torque_loop import CONVERGENCE, beyond_dead_band
+from ppafo.control.kind import BelievedBand, ControllerKind
+from ppafo.control.torque_loop import beyond_dead_band, convergence_rate
 from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.plant import chamber_1_volume, chamber_2_volume
 from ppafo.model.sensors import Measurement
@@ -22,7 +22,7 @@ NEARLY_SUPPLY = 0.999
 
 def _believed(name: str, unit: str, what: str, minimum: float, maximum: float) -> Quantity:
     """Declare a parameter of the nominal device, which defaults to the value of the device."""
-    return Quantity("", unit, f"believed {what}", None, minimum, maximum, follows=nominal_term(name))
+    return Quantity("", unit, f"believed {what}", None, minimum, maximum, follows=name)
 
 
 class NominalChambers(NamedTuple):
@@ -179,7 +179,7 @@ class _FeedbackLinearisationParameters(NamedTuple):
     """Decay rate of the error [1/s], time constant of the velocity filter [s], and the nominal device."""
 
     convergence_rate: Annotated[
-        float, Number("1/s", "rate at which the torque error decays", None, 0.0, 1.0e6, follows=CONVERGENCE)
+        float, Number("1/s", "rate at which the torque error decays", None, 0.0, 1.0e6, follows=convergence_rate)
     ]
     # Of the angle sensor and not of the device: some samples at 1 kHz, short against any valve.
     rate_filter: Annotated[float, Number("s", "time constant of the filter on the angle's rate", 0.0018, 0.0, 10.0)]

@@ -6,7 +6,7 @@ Units are given for a torque; where another quantity is controlled, read its uni
 from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import BelievedBand, ControllerKind
-from ppafo.control.torque_loop import INTEGRAL_GAIN, INTEGRAL_RATE, PROPORTIONAL_GAIN, beyond_dead_band
+from ppafo.control.torque_loop import beyond_dead_band, integral_gain, integral_rate, proportional_gain
 from ppafo.model.controlled import ANYTHING, OF_TORQUE, ErrorFunctions, seen_error
 from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.sensors import Measurement
@@ -15,8 +15,8 @@ from ppafo.model.sensors import Measurement
 class PidGains(NamedTuple):
     """PID gains [1/(N m)], [1/(N m s)], [s/(N m)]; derivative filter time constant [s]; back-calculation gain [1/s]."""
 
-    proportional_gain: Annotated[float, Number("1/(N m)", "k_p", None, 0.0, 1.0e3, follows=PROPORTIONAL_GAIN)]
-    integral_gain: Annotated[float, Number("1/(N m s)", "k_i", None, 0.0, 1.0e6, follows=INTEGRAL_GAIN)]
+    proportional_gain: Annotated[float, Number("1/(N m)", "k_p", None, 0.0, 1.0e3, follows=proportional_gain)]
+    integral_gain: Annotated[float, Number("1/(N m s)", "k_i", None, 0.0, 1.0e6, follows=integral_gain)]
     derivative_gain: Annotated[float, Number("s/(N m)", "k_d", 0.0, 0.0, 1.0e3)]
     derivative_filter: Annotated[
         float, Number("s", "time constant of the derivative filter, 0 for none", 0.0, 0.0, 1.0)
@@ -29,7 +29,7 @@ class PidGains(NamedTuple):
             None,
             0.0,
             1.0e5,
-            follows=INTEGRAL_RATE,
+            follows=integral_rate,
         ),
     ]
 

@@ -6,7 +6,14 @@ Units are given for a torque; where another quantity is controlled, read its uni
 from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import BelievedBand, ControllerKind
-from ppafo.control.torque_loop import BOUNDARY, DEAD_ZONE, INTEGRAL_RATE, OPENING, RELEASE, beyond_dead_band
+from ppafo.control.torque_loop import (
+    beyond_dead_band,
+    boundary_layer,
+    dead_zone,
+    dead_zone_opening,
+    integral_rate,
+    release,
+)
 from ppafo.model.controlled import ANYTHING, OF_TORQUE, ErrorFunctions, seen_error
 from ppafo.model.declaration import EmptyRow, Number, quantities_of
 from ppafo.model.sensors import Measurement
@@ -70,12 +77,12 @@ ON_OFF = ControllerKind(
 class OnOffDeadZoneParameters(NamedTuple):
     """Errors at which the valve opens and closes again [N m], and the command while open [-]."""
 
-    dead_zone: Annotated[float, Number("N m", "error at which the valve opens", None, 0.0, 100.0, follows=DEAD_ZONE)]
+    dead_zone: Annotated[float, Number("N m", "error at which the valve opens", None, 0.0, 100.0, follows=dead_zone)]
     release: Annotated[
         float,
-        Number("N m", "error at which it closes again; the dead zone at most", None, 0.0, 100.0, follows=RELEASE),
+        Number("N m", "error at which it closes again; the dead zone at most", None, 0.0, 100.0, follows=release),
     ]
-    opening: Annotated[float, Number("", "command while it is open", None, 0.0, 1.0, follows=OPENING)]
+    opening: Annotated[float, Number("", "command while it is open", None, 0.0, 1.0, follows=dead_zone_opening)]
 
 
 class OnOffDeadZoneState(NamedTuple):
@@ -131,10 +138,10 @@ class SlidingModeParameters(NamedTuple):
 
     surface_slope: Annotated[
         float,
-        Number("1/s", "weight of the error's integral in the surface", None, 0.0, 1.0e5, follows=INTEGRAL_RATE),
+        Number("1/s", "weight of the error's integral in the surface", None, 0.0, 1.0e5, follows=integral_rate),
     ]
     boundary_layer: Annotated[
-        float, Number("N m", "half width of the layer without switching", None, 1.0e-6, 1.0e4, follows=BOUNDARY)
+        float, Number("N m", "half width of the layer without switching", None, 1.0e-6, 1.0e4, follows=boundary_layer)
     ]
     reaching_command: Annotated[float, Number("", "opening outside the layer", 1.0, 0.0, 1.0)]
     dead_band: BelievedBand

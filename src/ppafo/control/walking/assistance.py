@@ -9,7 +9,7 @@ smooth rise to the peak, a smooth fall, zero; cubic with zero slope at its ends.
 
 from typing import NamedTuple
 
-from ppafo.control.torque_loop import REACH
+from ppafo.control.torque_loop import whole_reach
 from ppafo.control.walking import phases
 from ppafo.control.walking.phases import PHASE_QUANTITIES, PhaseState
 from ppafo.model.declaration import Quantity
@@ -87,7 +87,7 @@ ASSISTANCE_QUANTITIES = (
         None,
         0.0,
         1.0e3,
-        follows=REACH,
+        follows=whole_reach,
     ),
 )
 """Fields of ``Assistance`` in order."""

@@ -13,7 +13,7 @@ from typing import Annotated, Any, NamedTuple
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.controllers import model_based, pid, switching
 from ppafo.control.kind import BelievedBand, ControllerKind, reads_gait
-from ppafo.control.torque_loop import INTEGRAL_GAIN, PROPORTIONAL_GAIN, beyond_dead_band
+from ppafo.control.torque_loop import beyond_dead_band, integral_gain, proportional_gain
 from ppafo.control.walking import assistance, event_on_off, phases
 from ppafo.control.walking.assistance import ASSISTING_QUANTITIES, Assistance, TorqueRequest
 from ppafo.control.walking.phases import PhaseRules, PhaseState
@@ -143,11 +143,11 @@ class _ProportionalParameters(NamedTuple):
     """Gains on the torque error [1/(N m)] and its integral [1/(N m s)], and assumed dead band of the valve [-]."""
 
     torque_gain: Annotated[
-        float, Number("1/(N m)", "opening per torque error", None, 0.0, 1.0e3, follows=PROPORTIONAL_GAIN)
+        float, Number("1/(N m)", "opening per torque error", None, 0.0, 1.0e3, follows=proportional_gain)
     ]
     torque_integral_gain: Annotated[
         float,
-        Number("1/(N m s)", "opening per integral of the torque error", None, 0.0, 1.0e6, follows=INTEGRAL_GAIN),
+        Number("1/(N m s)", "opening per integral of the torque error", None, 0.0, 1.0e6, follows=integral_gain),
     ]
     dead_band: BelievedBand
 

@@ -8,7 +8,7 @@ so that its gas does not hold the foot down in the swing. The functional tasks o
 from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import ControllerKind
-from ppafo.control.torque_loop import REACH
+from ppafo.control.torque_loop import whole_reach
 from ppafo.control.walking import phases
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.model.declaration import EmptyRow, Number, quantities_of
@@ -40,7 +40,7 @@ class _EventOnOffParameters(NamedTuple):
             None,
             0.0,
             1.0e3,
-            follows=REACH,
+            follows=whole_reach,
         ),
     ]
     phases: PhaseRules

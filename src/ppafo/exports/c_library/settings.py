@@ -15,7 +15,7 @@ from ppafo.parameters.declared import value_at
 from ppafo.parameters.device import Device
 from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH
-from ppafo.simulation.clock import step_unless_given, step_with_output, time_texts
+from ppafo.simulation.clock import links_of_times, time_texts
 from ppafo.simulation.declaration import LOCKED_ANGLE, RUN
 from ppafo.simulation.numbers import declared_numbers, number_at, other_form, path_of_locked_angle
 from ppafo.simulation.profiles import TOLERANCE
@@ -72,13 +72,9 @@ def settings_of(scenario: Scenario, recorded: float | None) -> tuple[ExportParam
     if recorded is None:
         # The step of the file, from which the engine makes one that divides a sample.
         texts = time_texts(scenario)
-        step, output = (value_at(texts, f"run.{name}") for name in ("step", "output_interval"))
-        if step is not None:
-            times["run.step"] = parse_quantity(str(step), "s")
-        elif output is None:
-            times["run.step"] = step_unless_given(run.duration, period)
-        else:
-            times["run.step"] = step_with_output(run.duration, period, run.output_interval)
+        links, step = links_of_times(texts), value_at(texts, "run.step")
+        follows = links["run.step"][0].number(times.__getitem__) if step is None else parse_quantity(str(step), "s")
+        times["run.step"] = follows
     else:
         # A library may walk longer than a file; its step is that of a walk. No file has the command of a plant alone.
         declared |= {f"run.{quantity.name}": quantity for quantity in RUN if quantity.name != "step"}

@@ -16,49 +16,33 @@ from ppafo.parameters.effects import switches_of
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.contradictions import problems_of
 from ppafo.simulation.ensemble.columns import ScenarioColumns
-from ppafo.simulation.motion_kind import RunTimes
 from ppafo.simulation.numbers import NOISE_SEED, with_numbers
 from ppafo.simulation.scenario import Scenario
 
 
 @dataclass(slots=True)
 class _ValidRuns:
-    """Runs that passed the checks so far: indices in the ensemble (``members``), columns, clocks.
+    """Runs that passed the checks so far: indices in the ensemble (``members``) and their columns.
 
-    ``reasons`` maps the index of each refused run to a line that says why. ``clock`` is None for the scenario's own
-    clock; it is set before the first use of ``scenario``.
+    ``reasons`` maps the index of each refused run to a line that says why.
     """
 
     columns: ScenarioColumns
     members: Members
     reasons: dict[int, str]
-    clock: RunTimes | None = None
     _scenario: Scenario | None = None
 
     @property
     def scenario(self) -> Scenario:
         """Scenario with columns for the remaining runs, built once for all rules."""
         if self._scenario is None:
-            # The times that the clock computed replace those that were given.
-            numbers = {path: column for path, column in self.columns.values.items() if path not in TIMES}
-            scenario, clock = with_numbers(self.columns.base, numbers), self.clock
-            if clock is not None:
-                run = replace(
-                    scenario.run, duration=clock.duration, step=clock.step, output_interval=clock.output_interval
-                )
-                scenario = replace(scenario, run=run, controller=replace(scenario.controller, period=clock.period))
-            self._scenario = scenario
+            self._scenario = with_numbers(self.columns.base, self.columns.values)
         return self._scenario
 
     def subset(self, indices: Members) -> "_ValidRuns":
         """Return the runs at ``indices`` among the remaining ones, with the same ``reasons``."""
-        clock = self.clock
-        if clock is not None:
-            times = clock.duration, clock.step, clock.output_interval, clock.period
-            selected: list[Any] = [time[indices] if isinstance(time, np.ndarray) else time for time in times]
-            clock = RunTimes(*selected)
         values = {path: column[indices] for path, column in self.columns.values.items()}
-        return _ValidRuns(replace(self.columns, values=values), self.members[indices], self.reasons, clock)
+        return _ValidRuns(replace(self.columns, values=values), self.members[indices], self.reasons)
 
     def refuse(self, is_bad: Any, line: Callable[[int], str]) -> None:
         """Drop runs by a mask over the remaining ones, or all by one truth value; ``line(index)`` gives the reason."""
@@ -68,7 +52,7 @@ class _ValidRuns:
         for index in np.flatnonzero(bad):
             self.reasons[int(self.members[index])] = line(int(index))
         valid = self.subset(np.flatnonzero(~bad))
-        self.members, self.columns, self.clock, self._scenario = valid.members, valid.columns, valid.clock, None
+        self.members, self.columns, self._scenario = valid.members, valid.columns, None
 
 
 def screen_columns(columns: ScenarioColumns) -> _ValidRuns:
@@ -78,9 +62,12 @@ def screen_columns(columns: ScenarioColumns) -> _ValidRuns:
         # A default that follows others goes where they lead it, as it does in a single run.
         if path in columns.given or not columns.declared[path].follows:
             valid.refuse(*_out_of_range(valid.columns, path))
-    times = {path: column for path, column in valid.columns.values.items() if path in TIMES}
+    numbers = dict(valid.columns.values)
+    times = {path: numbers.pop(path) for path in TIMES if path in numbers}
     if times and valid.members.size:
-        valid.clock, problems = columns.base.motion.motion_kind.clock(columns.base, times)
+        # The times that the clock computed replace those that were given.
+        clock, problems = columns.base.motion.motion_kind.clock(columns.base, times)
+        valid.columns = replace(valid.columns, values=numbers | clock)
         for is_bad, line in problems:
             valid.refuse(is_bad, line)
     # After each problem that some runs have, the others are checked again: their numbers may have fewer.

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from ppafo.control import angle_loop, torque_loop
 from ppafo.control.kind import ControllerKind
@@ -13,20 +14,20 @@ from ppafo.parameters.device import SonicOrifice
 from ppafo.parameters.overrides import read_overrides
 from ppafo.report.kind import metric_change, metric_level
 from ppafo.simulation.declaration import law_settings
-from ppafo.simulation.default_gains import GAIN_TERMS, SLOPE_GAINS, default_links
+from ppafo.simulation.default_gains import SLOPE_GAINS, default_links, is_gain
 from ppafo.simulation.numbers import declared_numbers, number_at, of_its_chambers
 from ppafo.simulation.scenario import Scenario
 from ppafo.wording import override_text, without_exponent
 
 FASTEST_FIRST = (
-    torque_loop.PROPORTIONAL_GAIN,
-    torque_loop.BOUNDARY,
-    torque_loop.CONVERGENCE,
-    angle_loop.INNER_GAIN,
-    angle_loop.ANGLE_STIFFNESS,
+    torque_loop.proportional_gain,
+    torque_loop.boundary_layer,
+    torque_loop.convergence_rate,
+    angle_loop.inner_gain,
+    angle_loop.angle_stiffness,
 )
 """Settings that determine the speed of a loop; in a cascade the inner loop first, on which the outer one relies."""
-SLOWER_ABOVE = frozenset((torque_loop.BOUNDARY,))
+SLOWER_ABOVE = frozenset((torque_loop.boundary_layer,))
 """Settings whose increase makes the loop slower."""
 _SAME_GAIN = 0.02
 """Relative difference up to which two gains count as the same [-]."""
@@ -97,8 +98,8 @@ def change_text(controlled: str, number: float, digits: int = 3) -> str:
     return f"{without_exponent(value, f'.{digits}g')} {unit}"
 
 
-def speed_settings(scenario: Scenario, law: ControllerKind | None) -> dict[str, Quantity]:
-    """Settings that determine the speed of a controller's loops, by the term that they follow, innermost loop first."""
+def speed_settings(scenario: Scenario, law: ControllerKind | None) -> dict[Any, Quantity]:
+    """Settings that determine the speed of a controller's loops, by the rule that they follow, innermost loop first."""
     if law is None:
         return {}
     items = {
@@ -115,7 +116,7 @@ def default_gain_remedies(scenario: Scenario, law: ControllerKind | None) -> lis
     if law is None:
         return []
     settings, defaults = scenario.controller.settings, dict[str, float]()
-    gains = (item for item in law_settings(law, scenario.controlled) if item.follows in GAIN_TERMS)
+    gains = (item for item in law_settings(law, scenario.controlled) if is_gain(item))
     for path, (link,) in default_links(scenario, gains).items():
         if path not in scenario.links:
             # A default may follow one of this list before it.
@@ -136,7 +137,7 @@ def default_integral_remedy(scenario: Scenario, law: ControllerKind | None) -> l
     if law is None:
         return []
     settings = scenario.controller.settings
-    integrals = [item for item in law_settings(law, scenario.controlled) if item.follows == torque_loop.INTEGRAL_GAIN]
+    integrals = [item for item in law_settings(law, scenario.controlled) if item.follows == torque_loop.integral_gain]
     links = default_links(scenario, (item for item in integrals if settings.get(item.name) == 0.0))
     defaults = {path: link.number(lambda at: number_at(scenario, at)) for path, (link,) in links.items()}
     return [remedy(scenario, {path: default}) for path, default in defaults.items() if default > 0.0]
@@ -167,7 +168,7 @@ def smaller_pair(scenario: Scenario, step: float) -> tuple[Remedy, ...]:
 def torque_asked(scenario: Scenario, law: ControllerKind | None, error: float) -> float | None:
     """Torque [N m] requested at an angle error [rad] by a controller with a stiffness; None for another controller."""
     items = () if law is None else law_settings(law, scenario.controlled)
-    if scenario.controlled != ANGLE or not any(item.follows == angle_loop.ANGLE_STIFFNESS for item in items):
+    if scenario.controlled != ANGLE or not any(item.follows == angle_loop.angle_stiffness for item in items):
         return None
     settings = scenario.controller.settings
     return float(settings["angle_stiffness"]) * min(float(settings["error_limit"]), error)

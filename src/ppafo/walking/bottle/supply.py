@@ -121,7 +121,7 @@ class BottleSupply:
         }
 
 
-def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> BottleSupply | None:
+def read_bottle(reading: DocumentReader, device: Device) -> BottleSupply | None:
     """Return the bottle of a walk file, or None if it names no bottle.
 
     Raises ScenarioError or ParameterError for a value that cannot be used.
@@ -140,7 +140,7 @@ def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> Bottle
         name = section["name"]
         path = Path(name)
         is_file = path.suffix == ".toml" and not path.is_absolute()
-        bottle = load_bottle(folder / path if is_file else name, own)
+        bottle = load_bottle(reading.folder / path if is_file else name, own)
     pressure, room = device.supply.pressure, device.supply.atmospheric_pressure
     # Gauge is the same at both: a bottle's file knows no atmosphere, and stands in that of the device.
     own_pressure = to_si(bottle.entries[SET_PRESSURE].value, bottle.entries[SET_PRESSURE].unit, "Pa_a", room)
