@@ -50,13 +50,6 @@ def example_files(name: str) -> dict[PurePosixPath, bytes]:
     return dict(sorted(files.items()))
 
 
-def list_examples() -> CommandOutput:
-    """List the bundled examples with summaries."""
-    rows = [{"name": name, **example} for name, example in load_examples().items()]
-    examples = listing("example", rows, ("name", "summary"))
-    return replace(examples, text=f"{examples.text}\n\nppafo new example NAME writes one into a new folder.")
-
-
 def write_example(name: str, folder: Path) -> CommandOutput:
     """Write all files of an example into a new folder, or none; the output names the next command."""
     from ppafo.storage.files import replace_folder
@@ -143,7 +136,11 @@ def new(
                 else "--out: needs the NAME of the example to write"
             )
 
-        return list_examples() if name is None else write_example(name, out or Path(name))
+        if name is not None:
+            return write_example(name, out or Path(name))
+        rows = [{"name": name, **example} for name, example in load_examples().items()]
+        examples = listing("example", rows, ("name", "summary"))
+        return replace(examples, text=f"{examples.text}\n\nppafo new example NAME writes one into a new folder.")
     known = (*KINDS, EXAMPLE)
     if kind not in known:
         raise DataError(f"there is no kind of file '{kind}'{known_names(kind, known)}")

@@ -205,15 +205,6 @@ def export(
     return CommandOutput(f"written: {out} ({', '.join(files)}); next: {following}", document)
 
 
-def export_file(out: Path, make: Callable[[], bytes], following: str) -> CommandOutput:
-    """Write the file of an export unless it exists; the output names the next command."""
-    from ppafo.storage.files import write_file
-
-    check_new_file(out)
-    write_file(out, make())
-    return CommandOutput(f"written: {out}; next: {following}", {"file": str(out), "next": following})
-
-
 def listing(noun: str, rows: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> CommandOutput:
     """Format a list with a row for each entry and the given columns (default: all), with all entries as data."""
     from ppafo.report.writing import align_columns

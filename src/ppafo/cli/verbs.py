@@ -198,11 +198,12 @@ def export_fmu(
     >>> print(export_fmu("step-response", out=Path("step.fmu")).text.splitlines()[0])
     written: step.fmu; next: fmpy simulate step.fmu --output-file step.csv
     """
-    from ppafo.cli.output import export, export_file
+    from ppafo.cli.output import CommandOutput, check_new_file, export
     from ppafo.exports.fmu.interface import closed_loop, plant_alone
     from ppafo.exports.fmu.platforms import host_platform
     from ppafo.exports.fmu.unit import functional_unit
     from ppafo.loading import load_scenario
+    from ppafo.storage.files import write_file
 
     interface_of = {"loop": closed_loop, "plant": plant_alone}[interface]
     names = [host_platform()] if platforms is None else platforms.split(",")
@@ -219,7 +220,10 @@ def export_fmu(
 
     # A folder may be named like a unit too; it then gets the unit among its files.
     if out.suffix == ".fmu" and not out.is_dir():
-        said = export_file(out, lambda: next(iter(unit().values())), next_step(out))
+        check_new_file(out)
+        write_file(out, next(iter(unit().values())))
+        following = next_step(out)
+        said = CommandOutput(f"written: {out}; next: {following}", {"file": str(out), "next": following})
     else:
         said = export(out, "export fmu", unit, lambda files: next_step(out / files[0]))
     compared = [name for name in chosen if name == host_platform()]

@@ -1,18 +1,16 @@
 """Faults of a document by path: refusal of all of them, with the line of each in the text of the file."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import NoReturn
 
-from ppafo.documents.toml_text import KEY_LINE, quote
+from ppafo.documents.toml_text import KEY_LINE
 from ppafo.errors import PpafoError, raise_noted
-from ppafo.wording import folded, nearest_name, said_missing
+from ppafo.wording import said_missing
 
 _MAXIMUM_FAULTS = 5
 _MEANT = re.compile(r"^unknown key .*, did you mean '(\w+)'\?")
-_MAXIMUM_TABLES = 3
-"""Largest number of tables named in a message as containing an unknown key."""
 _LONG_TEXT = re.compile(r"\"\"\".*?\"\"\"|'''.*?'''", re.DOTALL)
 
 
@@ -31,20 +29,6 @@ def refuse(faults: Mapping[str, str], place: str, error: type[PpafoError], line:
         wrong.append(error(f"{place}: and {len(found) - _MAXIMUM_FAULTS} more like these"))
     raise_noted([*wrong, *([error(f"{place}: {said_missing(gaps)}")] if gaps else [])])
     raise AssertionError("without a fault there is nothing to refuse")
-
-
-def unknown_key(path: str, name: str, tables: Sequence[str], here: Sequence[str]) -> str:
-    """Return the fault of an unknown key: the ``tables`` that have it, else the nearest of those allowed ``here``."""
-    named = [f"[{table}]" if table else "the top of the file" for table in tables]
-    is_elsewhere = 0 < len(named) <= _MAXIMUM_TABLES
-    hint = f", which is a key of {' and '.join(named)}" if is_elsewhere else nearest_name(name, here)
-    return f"unknown key '{path}'{hint}; allowed here: {', '.join(folded(here))}"
-
-
-def no_table(path: str, value: object, required: Sequence[str]) -> str:
-    """Return the fault of a value where a table with ``required`` keys belongs."""
-    keys = f" with the key{'s' * (len(required) > 1)} {', '.join(required)}" if required else f", [{path}]"
-    return f"{path} = {quote(value)} must be a table{keys}"
 
 
 def line_of(text: str, path: str) -> str:

@@ -91,7 +91,7 @@ def read_device(parameter_set: ParameterSet, name: str, links: Graph) -> Device:
         remedy = f"use the completed set '{completed}'" if completed else "add them to the file or as overrides"
         raise ParameterError(f"{parameter_set.file}: the device lacks {', '.join(missing)}; {remedy}")
     read, kind, numbers = _reader(parameter_set), parameter_set.valve_kinds[name], parameter_set.numbers
-    species = parameter_set.texts[declaration.SPECIES_PATH].value
+    species = str(parameter_set.texts[declaration.SPECIES_PATH].value)
     if species not in SPECIES:
         raise ParameterError(
             f"{parameter_set.file}: gas.species = '{one_line(species)}' is unknown{known_names(species, SPECIES)}"
@@ -101,14 +101,14 @@ def read_device(parameter_set: ParameterSet, name: str, links: Graph) -> Device:
     if parameter_set.has_one_chamber:
         # The port of the second chamber is at the atmosphere and passes nothing.
         supply["dorsiflexion_pressure"] = supply["atmospheric_pressure"]
-    relieving = parameter_set.flags.get(declaration.RELIEVING_PATH)
+    relieving = parameter_set.texts.get(declaration.RELIEVING_PATH)
     return Device(
         name=parameter_set.name,
         gas=Gas(species, **read("gas", declaration.GAS)),
         actuator=_actuator(parameter_set, read),
         friction=Friction(**read("friction", declaration.FRICTION)),
         foot_plate=FootPlate(**read("foot_plate", declaration.FOOT_PLATE)),
-        supply=Supply(**supply, relieving=relieving is not None and relieving.value),
+        supply=Supply(**supply, relieving=relieving is not None and relieving.value is True),
         valve=Valve(
             kind=kind,
             settings=read(f"valves.{name}", VALVES[kind].quantities),
@@ -128,7 +128,7 @@ def contradictions_of_set(parameter_set: ParameterSet, device: Device) -> Iterat
     for paths, (is_bad, line) in contradictions(device, parameter_set):
         if is_bad:
             yield paths, line(0)
-    if device.supply.is_vacuum and declaration.RELIEVING_PATH in parameter_set.flags and not device.supply.relieving:
+    if device.supply.is_vacuum and declaration.RELIEVING_PATH in parameter_set.texts and not device.supply.relieving:
         yield (
             (declaration.RELIEVING_PATH, *SUPPLIES),
             f"{declaration.RELIEVING_PATH} = false: a supply below atmospheric pressure takes gas from the chambers; "

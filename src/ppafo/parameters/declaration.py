@@ -148,14 +148,6 @@ def fits(unit: str, si_unit: str) -> bool:
 def range_rule(quantity: Quantity, given: str = "") -> str:
     """Return the rule for a value out of range, such as ``must be at least 0 m^2 (area of the opening)``.
 
-    Limits are in the unit ``given`` by the user, as in ``limits_text``.
-    """
-    return f"must be {limits_text(quantity, given)}" + (f" ({quantity.summary})" if quantity.summary else "")
-
-
-def limits_text(quantity: Quantity, given: str = "") -> str:
-    """Format declared limits for a message: ``at least 0 cm^3 and at most 1000 cm^3``.
-
     The limits are in the unit ``given`` by the user if it is known and fits, else in the display unit.
     """
     given = quantity.unit if given == SI else given
@@ -164,8 +156,7 @@ def limits_text(quantity: Quantity, given: str = "") -> str:
     unit = f"{split_pressure_kind(unit)[0]}_a" if quantity.unit == "Pa_a" else "" if unit == "1" else unit
     beyond = "at least" if quantity.minimum_allowed else "more than"
     ends = ((beyond, quantity.minimum), ("at most", quantity.maximum))
-    return " and ".join(
-        f"{word} {from_si(limit, unit, quantity.unit):.6g} {unit}".rstrip()
-        for word, limit in ends
-        if math.isfinite(limit)
+    limits = (
+        f"{word} {from_si(end, unit, quantity.unit):.6g} {unit}".rstrip() for word, end in ends if math.isfinite(end)
     )
+    return f"must be {' and '.join(limits)}" + (f" ({quantity.summary})" if quantity.summary else "")

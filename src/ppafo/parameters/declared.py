@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.faults import line_of, no_table, refuse, unknown_key
+from ppafo.documents.faults import line_of, refuse
 from ppafo.documents.toml_text import NAME, NAME_RULE, SCHEMA, quote
 from ppafo.errors import KindError, PpafoError, UnitError
 from ppafo.model.declaration import Quantity
@@ -21,7 +21,7 @@ from ppafo.parameters.declaration import is_within, range_rule
 from ppafo.plugins import nearest_kind
 from ppafo.units import format_quantity, parse_quantity, split_quantity
 from ppafo.units.shown import shown_unit
-from ppafo.wording import nearest_name, one_line
+from ppafo.wording import folded, nearest_name, one_line
 
 KIND = "kind"
 """Key of a section that names its component, such as a controller, and so decides the other keys of the section."""
@@ -54,6 +54,8 @@ _FORMS: Mapping[type, str] = {
     float: "a finite number, or a text with its unit",
     int: "a whole number from 1 on, or a text in quotation marks",
 }
+_MAXIMUM_TABLES = 3
+"""Largest number of tables named in a message as containing an unknown key."""
 _TAKEN: Mapping[type, Any] = {float: str | int | float, int: str | int}
 
 
@@ -222,8 +224,12 @@ class FieldLayout:
             if keys and not re.fullmatch(keys, str(name)):
                 yield at, f"{path}: the name {quote(name)} {RULES[keys]}"
             elif name not in inner:
-                tables = [each for each, names in self.names.items() if str(name) in names]
-                yield at, unknown_key(at, str(name), tables, list(inner))
+                tables = [
+                    f"[{each}]" if each else "the top of the file" for each in self.names if name in self.names[each]
+                ]
+                is_elsewhere = 0 < len(tables) <= _MAXIMUM_TABLES
+                hint = f", which is a key of {' and '.join(tables)}" if is_elsewhere else nearest_name(str(name), inner)
+                yield at, f"unknown key '{at}'{hint}; allowed here: {', '.join(folded(inner))}"
             else:
                 yield from self._inside(inner[name], value)
         for name, at in inner.items():
@@ -253,7 +259,9 @@ class FieldLayout:
             return
         elif isinstance(field, InnerTable):
             required = [gap.rpartition(".")[2] for gap, _ in self._gaps(path, is_given=True)]
-            yield path, no_table(path, value, required) + "".join(f", or '{word}'" for word in field.words)
+            keys = f" with the key{'s' * (len(required) > 1)} {', '.join(required)}" if required else f", [{path}]"
+            words = "".join(f", or '{word}'" for word in field.words)
+            yield path, f"{path} = {quote(value)} must be a table{keys}{words}"
         elif isinstance(field, Many) and field.holds(value):
             for name, item in value.items() if field.keys else enumerate(value, 1):
                 at, of = f"{path}.{one_line(name)}", field.of

@@ -42,7 +42,6 @@ from ppafo.parameters.parameter_set import (
     TEXT_ENTRY,
     Citation,
     Entry,
-    FlagEntry,
     ParameterSet,
     TextEntry,
     chosen_valve,
@@ -141,8 +140,18 @@ def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -
     parameter_set = _parameter_set(document, fields, file, folder or Path())
     # Refuses a default valve that the set does not have.
     chosen_valve(parameter_set, None)
-    _check_numbers(parameter_set)
-    return replace(parameter_set, shown=written_units(parameter_set.numbers))
+    numbers, known = parameter_set.numbers, parameter_set.declarations()
+    if parameter_set.has_one_chamber and (of_second := OF_SECOND_CHAMBER.intersection(numbers)):
+        raise ParameterError(f"{file}: {WHY_ONE_CHAMBER}; remove {', '.join(sorted(of_second))}")
+    for path, entry in numbers.items():
+        # The layout of the file declares all paths but reported.valves.NAME, whose valve may be absent.
+        if path not in known:
+            valve = path.split(".")[2]
+            hint = nearest_name(valve, parameter_set.valve_kinds)
+            raise ParameterError(f"{file}: {path}: there is no valve '{valve}'{hint}")
+        with refused_as(ParameterError, f"{file}: {path}.unit", UnitError):
+            check_unit(entry.unit)
+    return replace(parameter_set, shown=written_units(numbers))
 
 
 def declared(document: Mapping[str, Any]) -> dict[str, Field]:
@@ -191,13 +200,10 @@ def _parameter_set(document: Mapping[str, Any], fields: Fields, file: str, folde
     # Section by section, the valves last.
     paths.sort(key=lambda path: (_ORDER.index(path.partition(".")[0]), path.startswith("reported.valves.")))
     entries = {path: table for path in paths if (table := value_at(document, path)) is not None}
-    texts, flags = {}, {}
-    numbers: dict[str, Entry] = {}
+    texts, numbers = dict[str, TextEntry](), dict[str, Entry]()
     for path, table in entries.items():
         if isinstance(fields[f"{path}.value"], Quantity):
             numbers[path] = record_from(Entry, table)
-        elif isinstance(table["value"], bool):
-            flags[path] = FlagEntry(**table)
         else:
             texts[path] = TextEntry(**table)
     for name, valve in document["valves"].items():
@@ -207,8 +213,14 @@ def _parameter_set(document: Mapping[str, Any], fields: Fields, file: str, folde
     actuator = _table(document, "actuator")
     kind, table = actuator.get("kind", VANE), None
     if "file" in actuator:
+        # Imported late, since few devices have a measured actuator.
+        from ppafo.model.actuators.table import Table as Measured
+        from ppafo.parameters.actuator_table import read_actuator_table
+
         with refused_as(ParameterError, f"{file}: actuator.file", ParameterError):
-            table = _measured_curves(kind, folder / actuator["file"])
+            # The file of another package's actuator may have another form, which is not read here.
+            is_read = ACTUATORS[kind].model.table is Measured
+            table = read_actuator_table(folder / actuator["file"]) if is_read else None
     citation = document.get("citation")
     parent, joint = document.get("parent", ""), document.get("joint")
     return ParameterSet(
@@ -222,20 +234,9 @@ def _parameter_set(document: Mapping[str, Any], fields: Fields, file: str, folde
         actuator_table=table,
         numbers=numbers,
         texts=texts,
-        flags=flags,
         accepted={item["finding"]: item["reason"] for item in document.get("accepted", ())},
         joint=ANKLE if joint is None else _joint_names(joint, file),
     )
-
-
-def _measured_curves(kind: str, file: Path) -> Any:
-    """Return the curves in the file of a measured actuator."""
-    # Imported late, since few devices have a measured actuator.
-    from ppafo.model.actuators.table import Table as Measured
-    from ppafo.parameters.actuator_table import read_actuator_table
-
-    # The file of another package's actuator may have another form, which is not read here.
-    return read_actuator_table(file) if ACTUATORS[kind].model.table is Measured else None
 
 
 def _joint_names(words: Mapping[str, str], file: str) -> JointNames:
@@ -248,22 +249,6 @@ def _joint_names(words: Mapping[str, str], file: str) -> JointNames:
             "also give joint.negative"
         )
     return JointNames(words["name"], words["positive"], negative)
-
-
-def _check_numbers(parameter_set: ParameterSet) -> None:
-    """Raise ParameterError for a number of an absent second chamber or valve, and for a unit that does not fit."""
-    file, numbers = parameter_set.file, parameter_set.numbers
-    if parameter_set.has_one_chamber and (of_second := OF_SECOND_CHAMBER.intersection(numbers)):
-        raise ParameterError(f"{file}: {WHY_ONE_CHAMBER}; remove {', '.join(sorted(of_second))}")
-    declared = parameter_set.declarations()
-    for path, entry in numbers.items():
-        # The layout of the file declares all paths but reported.valves.NAME, whose valve may be absent.
-        if path not in declared:
-            valve = path.split(".")[2]
-            hint = nearest_name(valve, parameter_set.valve_kinds)
-            raise ParameterError(f"{file}: {path}: there is no valve '{valve}'{hint}")
-        with refused_as(ParameterError, f"{file}: {path}.unit", UnitError):
-            check_unit(entry.unit)
 
 
 def json_schema() -> dict[str, Any]:

@@ -25,7 +25,6 @@ from ppafo.parameters.graph import ATMOSPHERE_PATH, acting
 from ppafo.parameters.parameter_set import (
     SOURCE,
     Entry,
-    FlagEntry,
     ParameterSet,
     TextEntry,
     atmospheric_pressure,
@@ -58,21 +57,21 @@ class Override(NamedTuple):
         return f"{self.typed}={self.text.removesuffix(f' {SI}')}"
 
 
-def split_override(override: str, error: type[PpafoError] = ParameterError) -> Override:
-    """Split a text such as ``run.duration=1 s`` into path and value. Raises ``error`` for any other text."""
-    on_one_line = one_line(override)
-    path, separator, text = (part.strip() for part in on_one_line.partition("="))
-    if not separator or not path or not text:
-        raise error(f"override '{on_one_line}' is not of the form PATH=VALUE, for example valve.area=12.6mm^2")
-    return Override(override, path, text)
-
-
 def read_overrides(texts: Iterable[str], error: type[PpafoError] = ParameterError) -> tuple[Override, ...]:
-    """Parse texts as overrides in their order. Raises ``error`` for all invalid texts, in sorted order."""
+    """Split texts such as ``run.duration=1 s`` into path and value, in their order.
+
+    Raises ``error`` for all other texts, in sorted order.
+    """
     in_order, wrong, read = tuple(texts), list[PpafoError](), dict[str, Override]()
     for text in sorted(in_order):
-        with noted_in(wrong):
-            read[text] = split_override(text, error)
+        on_one_line = one_line(text)
+        path, separator, value = (part.strip() for part in on_one_line.partition("="))
+        if separator and path and value:
+            read[text] = Override(text, path, value)
+        else:
+            wrong.append(
+                error(f"override '{on_one_line}' is not of the form PATH=VALUE, for example valve.area=12.6mm^2")
+            )
     raise_noted(wrong)
     return tuple(read[text] for text in in_order)
 
@@ -292,9 +291,9 @@ def _with_species(parameter_set: ParameterSet, path: str, override: Override) ->
 def _with_relieving(parameter_set: ParameterSet, path: str, override: Override) -> ParameterSet:
     if override.text not in ("true", "false"):
         raise ParameterError(f"override '{override}': must be true or false")
-    is_true, note = override.text == "true", _before(parameter_set, path)
-    entry = FlagEntry(value=is_true, origin="assumed", source=SOURCE, note=note)
-    return replace(parameter_set, flags={**parameter_set.flags, path: entry})
+    note, is_true = _before(parameter_set, path), override.text == "true"
+    entry = TextEntry(value=is_true, origin="assumed", source=SOURCE, note=note)
+    return replace(parameter_set, texts={**parameter_set.texts, path: entry})
 
 
 _CHANGES = {SPECIES_PATH: _with_species, RELIEVING_PATH: _with_relieving}

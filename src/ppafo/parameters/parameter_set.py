@@ -65,19 +65,9 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class TextEntry:
-    """Name or formula in a parameter set, with origin and source."""
+    """Name, formula, or true or false in a parameter set, with origin and source."""
 
-    value: Annotated[str, Words("name or formula")]
-    origin: _Origin
-    source: _Source
-    note: _Note = ""
-
-
-@dataclass(frozen=True, slots=True)
-class FlagEntry:
-    """True or false in a parameter set, with origin and source."""
-
-    value: Annotated[bool, Words("true or false", form=bool)]
+    value: Annotated[str | bool, Words("name or formula")]
     origin: _Origin
     source: _Source
     note: _Note = ""
@@ -94,10 +84,11 @@ class Citation:
     note: Annotated[str, Words()] = ""
 
 
-NUMBER_ENTRY, TEXT_ENTRY, FLAG_ENTRY, CITATION = map(fields_of, (Entry, TextEntry, FlagEntry, Citation))
+NUMBER_ENTRY, TEXT_ENTRY, CITATION = map(fields_of, (Entry, TextEntry, Citation))
+FLAG_ENTRY = {**TEXT_ENTRY, "value": Words("true or false", True, form=bool)}
 
 
-def written(entry: Entry | TextEntry | FlagEntry | Citation) -> dict[str, Any]:
+def written(entry: Entry | TextEntry | Citation) -> dict[str, Any]:
     """Return the table of an entry in a file, without defaults."""
     return {
         item.name: list(value) if isinstance(value, tuple) else value
@@ -110,7 +101,7 @@ def written(entry: Entry | TextEntry | FlagEntry | Citation) -> dict[str, Any]:
 class ParameterSet:
     """Parameter set: values as given, with provenance; gaps and conflicts are allowed until ``build_device``.
 
-    ``file`` is the label used in messages. ``numbers``, ``texts`` and ``flags`` are keyed by paths such as
+    ``file`` is the label used in messages. ``numbers`` and ``texts`` are keyed by paths such as
     ``actuator.leak.area`` or ``valves.solenoid.area``. ``valve_kinds`` gives the catalogue kind of each valve,
     ``actuator_kind`` the kind of the actuator, ``actuator_file`` the file of a measured actuator and ``actuator_table``
     its curves. ``joint`` names the turned joint. ``parent`` is the set from which this one was copied, a bundled name
@@ -132,7 +123,6 @@ class ParameterSet:
     actuator_table: "Table | None"
     numbers: Mapping[str, Entry]
     texts: Mapping[str, TextEntry]
-    flags: Mapping[str, FlagEntry]
     accepted: Mapping[str, str]
     joint: JointNames = ANKLE
     shown: Mapping[str, str] = field(default_factory=dict, compare=False)
@@ -142,9 +132,9 @@ class ParameterSet:
         valves = ", ".join(f"{name} ({kind})" for name, kind in self.valve_kinds.items())
         return f"ParameterSet '{self.name}': {self.title}\n  {len(self.entries())} values; valves: {valves}"
 
-    def entries(self) -> dict[str, Entry | TextEntry | FlagEntry]:
-        """Return all values of the set by path, as given: texts, then flags, then numbers."""
-        return {**self.texts, **self.flags, **self.numbers}
+    def entries(self) -> dict[str, Entry | TextEntry]:
+        """Return all values of the set by path, as given: texts, then numbers."""
+        return {**self.texts, **self.numbers}
 
     def declarations(self) -> Mapping[str, Quantity]:
         """Return the declarations of all numbers that this set may contain, by path."""
@@ -367,11 +357,11 @@ def number_in_si(parameter_set: ParameterSet, path: str) -> float | None:
         return base_value(entry.value, entry.unit)
 
 
-def entry_text(entry: Entry | TextEntry | FlagEntry) -> str:
+def entry_text(entry: Entry | TextEntry) -> str:
     """Format the value of any entry: number with unit, text, true or false."""
     if isinstance(entry, Entry):
         return format_quantity(entry.value, entry.unit)
-    return str(entry.value).lower() if isinstance(entry, FlagEntry) else entry.value
+    return str(entry.value).lower() if isinstance(entry.value, bool) else entry.value
 
 
 def overridden_paths(parameter_set: ParameterSet) -> frozenset[str]:

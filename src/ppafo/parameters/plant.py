@@ -40,11 +40,6 @@ def restriction(orifice: Orifice | SonicOrifice, gas: Gas, linear_ratio: float) 
     return area_restriction(orifice, gas, linear_ratio)
 
 
-def orifice_conductance(orifice: Orifice | SonicOrifice, gas: Gas) -> float:
-    """Conductance of an orifice in either form [kg/(s Pa)]: choked flow divided by upstream pressure. Equation (6)."""
-    return restriction(orifice, gas, 0.0).conductance
-
-
 def valve_settings(valve: Valve) -> Any:
     """Return the settings of a valve [SI] as the class of its kind; arrays (runs,) if varied."""
     return VALVES[valve.kind].settings(**valve.settings)

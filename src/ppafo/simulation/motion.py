@@ -50,7 +50,6 @@ from ppafo.simulation.profiles import (
     profile_problem,
     profiles_of,
     read_profile,
-    stops_of,
 )
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice, Scenario, vane_motion
 from ppafo.simulation.vane_recording import measured_vane
@@ -68,7 +67,8 @@ def contradictions(scenario: Scenario) -> Iterator[Contradiction]:
     if any(np.any(is_bad) for is_bad, _ in disordered):
         return
     delay, step, device = scenario.sensors.delay, scenario.run.step, scenario.device
-    motion, followed, stops = vane_motion(scenario), CONTROLLED[scenario.controlled], stops_of(scenario.device)
+    motion, followed = vane_motion(scenario), CONTROLLED[scenario.controlled]
+    stops = limits_of(device, CONTROLLED[ANGLE_CONTROLLED])
     profile = ProfileChoice("constant", {"level": motion.angle}) if motion.profile is None else motion.profile
 
     def beyond_stops(run: int) -> str:

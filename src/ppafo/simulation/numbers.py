@@ -1,7 +1,7 @@
 """Numbers of a scenario by dotted path: their declarations, and their replacement by columns for many runs."""
 
 from collections import deque
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields, replace
 from typing import Any, TypeVar
 
@@ -186,11 +186,20 @@ def moving_together(scenario: Scenario, replaced: Mapping[str, Any]) -> dict[str
 def _moved(scenario: Scenario, replaced: Mapping[str, Any]) -> tuple[dict[str, Any], Scenario, Graph]:
     """Return numbers with all that follow them, the scenario with orifices given in their other form, and its links."""
     changed, anew = scenario, dict[str, tuple[Link, ...]]()
-    for section in _changing_form(scenario, replaced):
+    for section, place in ORIFICES.items():
         form = other_form(scenario.device, section)
+        paths = [f"{section}.{name}" for name in form]
+        missing = [path for path in paths if path not in replaced]
+        if len(missing) == len(form):
+            continue
+        if missing:
+            raise ScenarioError(
+                f"{scenario.name}: {' and '.join(paths)} take the place of the other form together: also give "
+                f"{' and '.join(missing)}, or set both before"
+            )
         kind = SonicOrifice if "sonic_conductance" in form else Orifice
         orifice = kind(**{name: replaced[f"{section}.{name}"] for name in form})
-        changed = _replace_number(changed, ORIFICES[section], orifice)
+        changed = _replace_number(changed, place, orifice)
     if changed is not scenario:
         declared = scenario.motion.motion_kind.quantities(scenario)
         anew = default_links(changed, [declared[path] for path in scenario.links if path in declared])
@@ -229,22 +238,6 @@ def other_form(device: Device, section: str) -> tuple[str, ...]:
 def _numbers_of_other_form(device: Device) -> set[str]:
     """Return the paths of orifice numbers in the form (area or sonic conductance) that is not in use."""
     return {f"{section}.{name}" for section in ORIFICES for name in other_form(device, section)}
-
-
-def _changing_form(scenario: Scenario, paths: Collection[str]) -> list[str]:
-    """Return the sections of orifices that change between area and sonic conductance; each needs both its numbers."""
-    changing = []
-    for section in ORIFICES:
-        form = [f"{section}.{name}" for name in other_form(scenario.device, section)]
-        missing = [path for path in form if path not in paths]
-        if not missing:
-            changing.append(section)
-        elif len(missing) < len(form):
-            raise ScenarioError(
-                f"{scenario.name}: {' and '.join(form)} take the place of the other form together: also give "
-                f"{' and '.join(missing)}, or set both before"
-            )
-    return changing
 
 
 def path_of_locked_angle(scenario: Scenario) -> str | None:

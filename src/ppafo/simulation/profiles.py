@@ -12,7 +12,7 @@ from ppafo.engine.in_python import over_samples
 from ppafo.engine.rows import rebuilt
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import Problem, at, larger, over_runs
-from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, ControlledQuantity, Ends
+from ppafo.model.controlled import ANGLE, TORQUE, ControlledQuantity, Ends
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declared import kind_at
 from ppafo.parameters.device import Device
@@ -109,11 +109,6 @@ def widened(lowest: Any, highest: Any) -> tuple[Any, Any]:
     """Return limits with a margin for rounding in unit conversion; elementwise for columns."""
     margin = TOLERANCE * larger(1.0, larger(abs(lowest), abs(highest)))
     return lowest - margin, highest + margin
-
-
-def stops_of(device: Device) -> Limits:
-    """Angles [rad] of both stops of a device as limits."""
-    return limits_of(device, CONTROLLED[ANGLE])
 
 
 def limits_of(device: Device, followed: ControlledQuantity) -> Limits:

@@ -446,7 +446,10 @@ class Scenario:
                     f"{self.name}: a controller of type {kind} has no method '{method}'; it needs 'reset()' and "
                     f"'update(time, reference, measurement)', the latter returning a command from -1 to 1"
                 )
-        settings = request_settings(self)
+        # A law that requests a torque in a walk leaves its request to the object.
+        names, settings = [quantity.name for quantity in ASSISTING_QUANTITIES], self.controller.settings
+        requests = self.motion.motion_kind.layout == WALK and settings.keys() >= set(names)
+        settings = {name: settings[name] for name in names} if requests else {}
         changed = with_control(self, Control(PYTHON_CONTROLLER, settings, self.controller.period, controller))
         # The torque that a walk requests still follows the device.
         kept = {path: links for path, links in self.links.items() if path.removeprefix("controller.") in settings}
@@ -460,23 +463,9 @@ def vane_motion(scenario: Scenario) -> VaneMotion:
     raise ScenarioError(f"{scenario.name}: its motion is {scenario.motion.label}, but it must not walk here")
 
 
-def sensor_noise(scenario: Scenario) -> Any:
-    """Sum of all noise levels and lost fractions of the controller's sensors, which is 0 only without noise."""
-    forces = getattr(scenario.motion, "forces", {}).items()
-    own = (number for name, number in forces if name == "force_noise" or name.endswith("lost_share"))
-    return sum(own, scenario.sensors.angle_noise + scenario.sensors.pressure_noise)
-
-
 def scenario_document(scenario: Scenario) -> dict[str, Any]:
     """Return the whole scenario with every number of the device, in SI units, as data that can be written as JSON."""
     return {"units": UNITS, **plain(scenario)}
-
-
-def request_settings(scenario: Scenario) -> dict[str, float]:
-    """Return the settings by which the controller of a walk requests a torque; {} if it requests none."""
-    settings, names = scenario.controller.settings, [quantity.name for quantity in ASSISTING_QUANTITIES]
-    requests = scenario.motion.motion_kind.layout == WALK and settings.keys() >= set(names)
-    return {name: settings[name] for name in names} if requests else {}
 
 
 def with_control(scenario: Scenario, control: Control) -> Scenario:

@@ -143,12 +143,8 @@ def write_csv(path: str | Path, recording: Recording) -> Path:
 
 def marked_csv_bytes(recording: Recording) -> bytes:
     """Return the CSV table of a recording as a separate file, with a comment line on its kind unless measured."""
-    return mark_of(recording.kind).encode() + csv_bytes(recording)
-
-
-def mark_of(kind: RecordingKind) -> str:
-    """Return the comment line that marks simulated or synthetic data; empty for measured data."""
-    return f"{_MARKS[kind]}\n" if kind in _MARKS else ""
+    mark = f"{_MARKS[recording.kind]}\n" if recording.kind in _MARKS else ""
+    return mark.encode() + csv_bytes(recording)
 
 
 def csv_bytes(recording: Recording) -> bytes:
@@ -165,11 +161,6 @@ def csv_bytes(recording: Recording) -> bytes:
     rows = map(",".join, zip(*(map(repr, column.tolist()) for column in columns), strict=True))
     buffer.writelines(f"{row}\n" for row in rows)
     return buffer.getvalue().encode()
-
-
-def _delimiter_of(header: str) -> str:
-    # A unit may contain a semicolon: a tab or a semicolon separates only where all cells then are columns.
-    return next((mark for mark in "\t;" if mark in header and all(map(_HEADER.fullmatch, header.split(mark)))), ",")
 
 
 def header_cells(cells: list[str], mark: str) -> list[str]:
@@ -201,7 +192,9 @@ def read_csv(
         lines = text.splitlines()
         first = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
         head = next(islice(lines, first, None), "")
-        mark = _delimiter_of(head)
+        # A unit may contain a semicolon: a tab or a semicolon separates only where all cells then are columns.
+        marks = (each for each in "\t;" if each in head and all(map(_HEADER.fullmatch, head.split(each))))
+        mark = next(marks, ",")
         rows: Iterator[list[str]] = csv.reader(islice(lines, first, None), delimiter=mark, strict=True)
         header = header_cells(next(rows, []), mark)
         if not header and not any(lines[first:]):

@@ -27,7 +27,7 @@ def test_a_set_keeps_the_key_with_its_provenance_when_it_is_written_and_read() -
     assert "[supply.relieving]\nvalue = true\norigin" in text
     again = parse_parameter_set(text.encode(), "again.toml")
     assert again.entries() == changed.entries()
-    assert again.flags["supply.relieving"].note == "the set has no value"
+    assert again.texts["supply.relieving"].note == "the set has no value"
 
 
 @pytest.mark.parametrize("text", ["1", "yes", "True", "0.5 psi_g"])

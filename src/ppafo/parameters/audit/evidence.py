@@ -121,7 +121,7 @@ class Evidence:
     def text(self, path: str) -> str | None:
         """Return the name or formula at a path."""
         entry = self.parameter_set.texts.get(path)
-        return None if entry is None else entry.value
+        return None if entry is None else str(entry.value)
 
     def magnitude(self, path: str) -> ReportedRange | None:
         """Return the interval of the magnitude of a parameter [SI]: its stated uncertainty, else its rounding."""
@@ -154,7 +154,7 @@ class Evidence:
         """Return the values of parameters, as stated in the set; missing values are omitted."""
         numbers, texts = self.parameter_set.numbers, self.parameter_set.texts
         values = [NamedValue(p, numbers[p].value, numbers[p].unit, numbers[p].origin) for p in paths if p in numbers]
-        return (*values, *(NamedValue(p, texts[p].value, "", texts[p].origin) for p in paths if p in texts))
+        return (*values, *(NamedValue(p, str(texts[p].value), "", texts[p].origin) for p in paths if p in texts))
 
     def gas(self) -> Gas | None:
         """Return the gas; None if the set lacks one of its numbers or a number is out of range."""

@@ -13,7 +13,7 @@ from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Eviden
 from ppafo.parameters.building import both_forms
 from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM
 from ppafo.parameters.device import Orifice, SonicOrifice
-from ppafo.parameters.plant import orifice_conductance
+from ppafo.parameters.plant import restriction
 
 _SUPPLY = "supply.pressure"
 _GRAMS = 1e3
@@ -53,7 +53,7 @@ def _open_valve(evidence: Evidence, section: str, upstream: float, downstream: f
         numbers = evidence.numbers(*(f"{section}.{quantity.name}" for quantity in form))
         if numbers is not None and min(numbers) > 0.0 and (form is AREA_FORM or numbers[1] < 1.0):
             is_area = form is AREA_FORM
-            conductance = orifice_conductance(Orifice(*numbers) if is_area else SonicOrifice(*numbers), gas)
+            conductance = restriction(Orifice(*numbers) if is_area else SonicOrifice(*numbers), gas, 0.0).conductance
             psi = isentropic_flow_function(ratio, gas.heat_capacity_ratio) if is_area else None
             flow = conductance * upstream * (iso6358_flow_function(ratio, numbers[1]) if psi is None else psi)
             return _OpenValve(form, numbers[0] * numbers[1] if is_area else numbers[0], conductance, flow)

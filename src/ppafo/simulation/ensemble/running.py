@@ -2,14 +2,13 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from ppafo.control.kind import PythonController
 from ppafo.engine.compilers import Effort
 from ppafo.engine.lanes import Batch, BatchResult, Count, Floats, load_programs, run_blocks
-from ppafo.engine.program import Program
 from ppafo.engine.rows import group_of, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError
@@ -17,7 +16,6 @@ from ppafo.metrics import METRICS, has_channels
 from ppafo.metrics.gas import WITH_ENERGY_BALANCE
 from ppafo.metrics.metric import MetricKind, Readings
 from ppafo.progress import report_nothing
-from ppafo.signals.meter import MeterKind
 from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.python_controller import run_sampled
 from ppafo.simulation.scenario import Scenario
@@ -129,7 +127,9 @@ class _MeteredBatch:
         program = self.batch.program
         course = group_of("course", program.state_rows(), states) if program.follows_reference else ()
         traces = {} if record is None else {name: record[:, row] for row, name in enumerate(program.traced)}
-        meters, interval = meters_of(program, states), self.interval[runs]
+        groups, interval = program.state_rows(), self.interval[runs]
+        # The final state of each meter: arrays (runs,) in meter units.
+        meters = {kind.name: group_of(group, groups, states) for group, kind in program.meter_groups.items()}
         readings = Readings(meters=meters, course=course, interval=interval, samples=self.samples, traces=traces)
         with np.errstate(all="ignore"):
             return {name: np.asarray(self.metrics[name].read(readings)) for name in names}
@@ -169,7 +169,14 @@ def _meter_batch(plain: Batch, members: Members, request: OutputRequest) -> _Met
     # Metrics read from traces need every sample; bands alone need only those at which they are drawn.
     trace_every, band_stride = (1, stride) if read_from_traces else (stride, 1)
     traced = sorted({*read_from_traces, *request.bands})
-    batch = add_meters(plain, [meter for _, meter in meters], traced, trace_every if traced else 0)
+    # Meters are read at every sample that would have been recorded; none is recorded.
+    program = replace(plain.program, meters=tuple(meter for _, meter in meters), traced=tuple(traced))
+    trace = trace_every if traced else 0
+    clock = replace(plain.clock, record_every=0, measure_every=plain.clock.record_every, trace_every=trace)
+    # Meters begin with zeros; their first sample fills them.
+    states = np.zeros((len(row_numbers(program.state_rows())), plain.states.shape[1]))
+    states[: plain.states.shape[0]] = plain.states
+    batch = Batch(program, clock, plain.parameters, states)
     return _MeteredBatch(batch, members, len(plain.states), metrics, interval, plain.clock.samples, band_stride)
 
 
@@ -177,23 +184,3 @@ def intervals(batch: Batch) -> Floats:
     """Time between two samples [s] of each run of a batch without meters."""
     timing = group_of("timing", batch.program.parameter_rows(), batch.parameters)
     return np.asarray(timing.step * batch.clock.record_every)
-
-
-def add_meters(batch: Batch, meters: Sequence[MeterKind], traced: Sequence[str], trace_every: int) -> Batch:
-    """Return the batch with meters at every sample that it would have recorded, and without recording.
-
-    The ``traced`` channels are stored every ``trace_every`` samples, 0 for never.
-    """
-    program = replace(batch.program, meters=tuple(meters), traced=tuple(traced))
-    clock = replace(batch.clock, record_every=0, measure_every=batch.clock.record_every, trace_every=trace_every)
-    rows = len(row_numbers(program.state_rows()))
-    # Meters begin with zeros; their first sample fills them.
-    states = np.zeros((rows, batch.states.shape[1]))
-    states[: batch.states.shape[0]] = batch.states
-    return Batch(program, clock, batch.parameters, states)
-
-
-def meters_of(program: Program, states: Floats) -> dict[str, Any]:
-    """Return the final state of each meter by name, from final states (rows, runs): arrays (runs,) in meter units."""
-    groups = program.state_rows()
-    return {kind.name: group_of(group, groups, states) for group, kind in program.meter_groups.items()}
