@@ -9,7 +9,7 @@ comment. Without a column ``volume_2`` the actuator has one chamber, and chamber
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from itertools import pairwise, product
@@ -22,7 +22,7 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.toml_text import label
 from ppafo.errors import ParameterError, UnitError, refused_as
 from ppafo.model.actuators.table import BENDS, MOST_ANGLES, MOST_PRESSURES, RISES, Curve, Rise, Table, TabulatedChamber
-from ppafo.parameters.number_table import LONGEST, NumberedLine, lines_of_table, numbers_of_table
+from ppafo.parameters.number_table import LONGEST, lines_of_table, numbers_of_table
 from ppafo.signals.recording import Floats
 from ppafo.units import to_si
 from ppafo.units.shown import counted_from, shown_in, shown_text
@@ -90,7 +90,22 @@ def read_measured_volumes(path: Path) -> MeasuredVolumes:
     file = label(str(path))
     (_, header), *rows = lines_of_table(path, file, "angle [deg],pressure [kPa_g],volume_1 [mL]")
     units = _units(header, file)
-    columns, digits = _columns(rows, units, file)
+    numbers = numbers_of_table(rows, tuple(units), file)
+    columns: dict[str, Floats] = {}
+    digits: dict[str, float] = {}
+    for index, (name, unit) in enumerate(units.items()):
+        declared = COLUMNS[name]
+        # Over a vacuum a gauge pressure is its own SI value.
+        column = np.array([to_si(row[index], unit, declared.unit, 0.0) for row in numbers])
+        worst = int(np.argmax(np.abs(column)))
+        if abs(column[worst]) > declared.largest:
+            raise ParameterError(
+                f"{file}, line {rows[worst][0]}: {name} = {numbers[worst][index]:g} {unit} exceeds "
+                f"{declared.largest:g} {declared.unit.removesuffix('_a')}"
+            )
+        columns[name] = column
+        step = _step([Decimal(cells[index]) for _, cells in rows])
+        digits[name] = abs(to_si(step, unit, declared.unit, 0.0) - to_si(0.0, unit, declared.unit, 0.0))
     angles = np.unique(columns["angle"])
     pressures = np.unique(columns["pressure"])
     # Refusals are in the units of the table.
@@ -112,29 +127,6 @@ def read_measured_volumes(path: Path) -> MeasuredVolumes:
         resolution_1=digits["volume_1"],
         resolution_2=digits.get("volume_2", 0.0),
     )
-
-
-def _columns(
-    lines: Sequence[NumberedLine], units: Mapping[str, str], file: str
-) -> tuple[dict[str, Floats], dict[str, float]]:
-    """Return the columns of a file by name, each (lines,), and their rounding steps [SI]; pressures are gauge."""
-    rows = numbers_of_table(lines, tuple(units), file)
-    columns: dict[str, Floats] = {}
-    digits: dict[str, float] = {}
-    for index, (name, unit) in enumerate(units.items()):
-        declared = COLUMNS[name]
-        # Over a vacuum a gauge pressure is its own SI value.
-        column = np.array([to_si(row[index], unit, declared.unit, 0.0) for row in rows])
-        worst = int(np.argmax(np.abs(column)))
-        if abs(column[worst]) > declared.largest:
-            raise ParameterError(
-                f"{file}, line {lines[worst][0]}: {name} = {rows[worst][index]:g} {unit} exceeds "
-                f"{declared.largest:g} {declared.unit.removesuffix('_a')}"
-            )
-        columns[name] = column
-        step = _step([Decimal(cells[index]) for _, cells in lines])
-        digits[name] = abs(to_si(step, unit, declared.unit, 0.0) - to_si(0.0, unit, declared.unit, 0.0))
-    return columns, digits
 
 
 def _step(numbers: Sequence[Decimal]) -> float:

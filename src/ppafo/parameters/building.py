@@ -4,7 +4,7 @@ import itertools
 import math
 import operator
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -57,6 +57,8 @@ _UNUSED_VOLUME = 1.0e-6
 """Constant volume [m^3] of chamber 2 for an actuator with one chamber; no gas flows into it."""
 _NO_LEAK = Orifice(area=0.0, discharge_coefficient=1.0)
 SUPPLIES = PRESSURE_PATH, SECOND_PRESSURE_PATH
+RELATIONS = {"below": operator.lt, "above": operator.gt, "at most": operator.le, "at least": operator.ge}
+"""Relation of a number to another one, elementwise over runs, by its words."""
 Reader = Callable[[str, Iterable[Quantity]], dict[str, float]]
 """Function that reads the declared quantities of a section as numbers [SI] by name."""
 _FLAT_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
@@ -149,9 +151,16 @@ def contradictions(device: Device, stated: ParameterSet | None = None) -> Iterat
     Numbers are shown as the set that ``stated`` them has them. Later problems rely on earlier ones.
     """
     actuator, stops = device.actuator, ("actuator.angle_min", "actuator.angle_max")
-    for path, relation, other, holds in consistency(device):
+    for path, relation, other in consistency(device):
         paths = tuple(re.sub("^valve[.]", f"valves.{device.valve_name}.", name) for name in (path, other))
-        yield paths, (np.logical_not(holds), partial(_rule_line, device, stated, path, relation, other))
+        number, limit = (number_under(device, name.split(".")) for name in (path, other))
+        yield (
+            paths,
+            (
+                np.logical_not(RELATIONS[relation](number, limit)),
+                partial(_rule_line, device, stated, path, relation, other),
+            ),
+        )
     is_misshapen: Any = True
     if np.all(actuator.angle_min < actuator.angle_max):
         is_misshapen, line = _shape_problem(actuator)
@@ -331,45 +340,21 @@ def missing_values(parameter_set: ParameterSet, valve: str) -> list[str]:
     return missing + [path for path in (declaration.SPECIES_PATH,) if path not in parameter_set.texts]
 
 
-def consistency(device: Device) -> tuple[tuple[str, str, str, bool], ...]:
-    """Rules between two numbers: path, relation, other path, and True if satisfied (elementwise over runs)."""
-    actuator, friction, supply = device.actuator, device.friction, device.supply
+def consistency(device: Device) -> Iterator[tuple[str, str, str]]:
+    """Yield the rules between two numbers of a device: path, one of ``RELATIONS``, and path of the other number."""
+    yield "actuator.angle_min", "below", "actuator.angle_max"
+    yield "friction.dynamic_torque", "at most", "friction.static_torque"
     # Of two supplies on either side of the atmosphere both would turn the joint one way.
-    pressures = supply.pressure, supply.dorsiflexion_pressure
-    sides = [pressure - supply.atmospheric_pressure for pressure in pressures]
-    is_suction = supply.is_vacuum and max(first(gauge) for gauge in sides) <= 0.0
-    return (
-        ("actuator.angle_min", "below", "actuator.angle_max", actuator.angle_min < actuator.angle_max),
-        (
-            "friction.dynamic_torque",
-            "at most",
-            "friction.static_torque",
-            friction.dynamic_torque <= friction.static_torque,
-        ),
-        *(
-            (path, "at most", ATMOSPHERE_PATH, gauge <= 0.0)
-            if is_suction
-            else (path, "at least", ATMOSPHERE_PATH, gauge >= 0.0)
-            for path, gauge in zip(SUPPLIES, sides, strict=True)
-        ),
-        *_order_of_pressures(device.valve.settings, supply.atmospheric_pressure),
-        *_order_of_openings(device.effects.get("opening", {})),
-    )
-
-
-def _order_of_pressures(settings: Mapping[str, Any], room: Any) -> Iterator[tuple[str, str, str, Any]]:
-    """Yield the rules between the lowest pressure of a regulator, its highest one and the atmosphere."""
-    if "highest_pressure" in settings:
-        lowest, highest = settings["lowest_pressure"], settings["highest_pressure"]
-        yield "valve.lowest_pressure", "below", "valve.highest_pressure", lowest < highest
-        yield "valve.lowest_pressure", "at least", ATMOSPHERE_PATH, lowest >= room
-
-
-def _order_of_openings(table: Mapping[str, Any]) -> Iterator[tuple[str, str, str, Any]]:
-    """Yield the rules between the nodes of a table of openings: commands rise, and openings do not fall."""
+    supply, room = device.supply, first(device.supply.atmospheric_pressure)
+    is_suction = supply.is_vacuum and max(first(supply.pressure), first(supply.dorsiflexion_pressure)) <= room
+    for path in SUPPLIES:
+        yield path, "at most" if is_suction else "at least", ATMOSPHERE_PATH
+    if "highest_pressure" in device.valve.settings:
+        yield "valve.lowest_pressure", "below", "valve.highest_pressure"
+        yield "valve.lowest_pressure", "at least", ATMOSPHERE_PATH
+    # Of a table of openings commands rise, and openings do not fall.
+    table, path = device.effects.get("opening", {}), f"{SECTION}.opening"
     used = [name[-2:] for name, command in table.items() if name.startswith("command") and first(command) > 0.0]
     for before, after in itertools.pairwise(used):
-        for name, relation, compare in (("command", "below", operator.lt), ("opening", "at most", operator.le)):
-            paths = (f"{SECTION}.opening.{name}_{number}" for number in (before, after))
-            low, high = (table[f"{name}_{number}"] for number in (before, after))
-            yield next(paths), relation, next(paths), compare(low, high)
+        yield f"{path}.command_{before}", "below", f"{path}.command_{after}"
+        yield f"{path}.opening_{before}", "at most", f"{path}.opening_{after}"

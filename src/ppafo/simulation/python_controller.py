@@ -3,7 +3,6 @@
 import logging
 import math
 import traceback
-from typing import Any
 from weakref import WeakSet
 
 import numpy as np
@@ -28,6 +27,7 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
     SimulationError for a command that is no finite number, and for a programming error in the controller.
     """
     run = SampledRun(batch)
+    name, walks = type(controller).__name__, batch.program.walks
     is_framed = run.requests_torque and not reads_gait(controller.update)
     # The object's memory of an earlier run must not steer this one.
     try:
@@ -42,29 +42,24 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
             command = controller.update(run.time, run.reference, measurement)
         except (NameError, AttributeError, TypeError) as error:
             raise _programming_error(controller, error) from error
-        limited = _valve_command(command, controller, run.time, batch.program.walks)
+        # A comparison that was meant to be a command is a bool, which Python takes for a whole number.
+        is_number = isinstance(command, int | float | np.floating) and not isinstance(command, bool)
+        if not is_number or not math.isfinite(command):
+            raise SimulationError(
+                f"{name}.update returned {command!r} at t = {run.time:.6g} s; it must return a finite number"
+            )
+        limited = VENT if walks and command > VENTS_ABOVE else max(-1.0, min(1.0, float(command)))
+        if limited != command and type(controller) not in _REPORTED_CLASSES:
+            _REPORTED_CLASSES.add(type(controller))
+            logger.warning(
+                "ppafo: %s.update returned %g at t = %.6g s; commands must be %s and are limited to this range",
+                name,
+                command,
+                run.time,
+                f"-1 to 1, or {VENT:g} to vent both chambers" if walks else "-1 to 1",
+            )
         run.advance(VENT if is_framed and run.vents(measurement) else limited)
     return run.result()
-
-
-def _valve_command(command: Any, controller: PythonController, time: float, walks: bool) -> float:
-    """Return a command limited to the valve's range [-]; a walk has an additional command that vents both chambers."""
-    name = type(controller).__name__
-    # A comparison that was meant to be a command is a bool, which Python takes for a whole number.
-    is_number = isinstance(command, int | float | np.floating) and not isinstance(command, bool)
-    if not is_number or not math.isfinite(command):
-        raise SimulationError(f"{name}.update returned {command!r} at t = {time:.6g} s; it must return a finite number")
-    limited = VENT if walks and command > VENTS_ABOVE else max(-1.0, min(1.0, float(command)))
-    if limited != command and type(controller) not in _REPORTED_CLASSES:
-        _REPORTED_CLASSES.add(type(controller))
-        logger.warning(
-            "ppafo: %s.update returned %g at t = %.6g s; commands must be %s and are limited to this range",
-            name,
-            command,
-            time,
-            f"-1 to 1, or {VENT:g} to vent both chambers" if walks else "-1 to 1",
-        )
-    return limited
 
 
 def _programming_error(controller: PythonController, error: NameError | AttributeError | TypeError) -> SimulationError:

@@ -129,8 +129,22 @@ def check_folder_can_be_replaced(folder: Path) -> None:
     with _write_errors(folder), _make_folder(target.parent):
         trial = _sibling(target, "trial")
         _try_folder(trial)
-        if target.is_dir():
-            _try_renaming(target, trial)
+        if not target.is_dir():
+            return
+        # A mount point, another user's sticky folder or a lower layer cannot be renamed. The trial's target contains a
+        # file, so that nothing is renamed; other obstacles are reported first.
+        try:
+            trial.mkdir()
+            (trial / "file").touch()
+            target.rename(trial)
+        except OSError as error:
+            if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+                why = f"the folder itself cannot be replaced ({reason(error)}); choose a new subfolder"
+                raise OSError(None, why) from error
+        else:
+            trial.rename(target)
+        finally:
+            shutil.rmtree(trial, ignore_errors=True)
 
 
 def check_files_can_be_added(folder: Path, names: Iterable[str]) -> None:
@@ -146,25 +160,6 @@ def _try_folder(trial: Path) -> None:
     finally:
         with contextlib.suppress(OSError):
             trial.rmdir()
-
-
-def _try_renaming(folder: Path, trial: Path) -> None:
-    """Raise OSError if a folder cannot be renamed, as a mount point, another user's sticky folder, or a lower layer.
-
-    The trial target contains a file, so that nothing is renamed; other obstacles are reported first.
-    """
-    try:
-        trial.mkdir()
-        (trial / "file").touch()
-        folder.rename(trial)
-    except OSError as error:
-        if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
-            why = f"the folder itself cannot be replaced ({reason(error)}); choose a new subfolder"
-            raise OSError(None, why) from error
-    else:
-        trial.rename(folder)
-    finally:
-        shutil.rmtree(trial, ignore_errors=True)
 
 
 def _real(folder: Path) -> Path:

@@ -101,13 +101,10 @@ def check_owned_folder(folder: Path, kind: FolderKind, kept: Mapping[str, bytes]
     if not is_folder and os.path.lexists(folder):
         raise DataError(f"{folder}: is a file; a {kind.noun} needs a folder")
     present = {entry.name for entry in entries_of(folder)} if is_folder else set()
-    if present:
-        _check_earlier_result(folder, kind, present, kept)
-    check_folder_can_be_replaced(folder)
-
-
-def _check_earlier_result(folder: Path, kind: FolderKind, present: Collection[str], kept: Mapping[str, bytes]) -> None:
-    """Raise DataError unless a folder is unchanged since an earlier result of this kind."""
+    if not present:
+        check_folder_can_be_replaced(folder)
+        return
+    # Only an earlier result of this kind is replaced, and only as long as nobody changed it.
     if kind.mark not in present:
         raise DataError(f"{folder}: is not empty and not a {kind.noun} (it has no {kind.mark}); choose another folder")
     hashes = kind.document_of(folder).get(HASHES)
@@ -134,6 +131,7 @@ def _check_earlier_result(folder: Path, kind: FolderKind, present: Collection[st
             f"{folder}: contains files that were changed since its {kind.noun} was written ({_shortened(changed)}); "
             "move them or use another folder"
         )
+    check_folder_can_be_replaced(folder)
 
 
 def _foreign_names(folder: Path, expected: Collection[str], prefix: str = "") -> Iterator[str]:

@@ -1,7 +1,6 @@
 """Contradictory settings of a walk, each reported in a line that names both settings; any may be an array (runs,)."""
 
 import math
-import operator
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 from ppafo.control.catalog import switching_remedy
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.model.columns import at
+from ppafo.parameters.building import RELATIONS
 from ppafo.simulation.contradictions import IN_FILES, Contradiction
 from ppafo.simulation.scenario import Scenario
 from ppafo.units.shown import shown_text
@@ -55,7 +55,6 @@ PAIRS = (
         "the peak would be over before the push-off",
     ),
 )
-_IS_BAD = {"below": operator.ge, "above": operator.le, "at most": operator.gt, "at least": operator.lt}
 
 
 _PHASES = np.linspace(0.0, 1.0, 200, endpoint=False)
@@ -79,7 +78,7 @@ def contradictions(scenario: Scenario) -> Iterator[Contradiction]:
                     return f"{pair.words}: {pair.other} = {value}"
                 return f"must be {pair.relation} {pair.other} = {value}"
 
-            yield Contradiction(pair.path, _IS_BAD[pair.relation](number, other), reason)
+            yield Contradiction(pair.path, np.logical_not(RELATIONS[pair.relation](number, other)), reason)
     # An object in charge has no settings that could contradict.
     if scenario.controller.is_outside:
         return

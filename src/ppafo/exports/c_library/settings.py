@@ -98,7 +98,7 @@ def relations_of(
     known = {setting.path for setting in settings}
     relations = [
         Relation(path, relation, other, unless=all_opposite(relation, known) if other == ATMOSPHERE_PATH else "")
-        for path, relation, other, _ in consistency(scenario.device)
+        for path, relation, other in consistency(scenario.device)
     ]
     if scenario.supply_lines is not None:
         relations.append(Relation(SECOND_PRESSURE_PATH, "at most", PRESSURE_PATH))

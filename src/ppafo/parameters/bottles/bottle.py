@@ -332,13 +332,7 @@ def _build(parsed: Mapping[str, Any], entries: Mapping[str, Entry], file: str) -
         hose=Passage(*(values[f"hose.{name}"] for name in Passage._fields)),
         entries=entries,
     )
-    _check_content(bottle, file)
-    return bottle
-
-
-def _check_content(bottle: Bottle, file: str) -> None:
-    """Raise ParameterError for an overfull bottle, or a fill pressure too low for the regulator."""
-    fluid, temperature = bottle.fluid, bottle.room_temperature
+    temperature = bottle.room_temperature
     check_temperature("room.temperature", temperature, fluid, file)
     # Liquid can fill the whole bottle; a gas without liquid is limited by its table.
     is_wet = has_liquid(fluid.table)
@@ -359,3 +353,4 @@ def _check_content(bottle: Bottle, file: str) -> None:
             f"{temperature:g} K, but the regulator needs {shown_text(required, 'Pa_a', '.4g', unit=unit)}, the sum of "
             "regulator.set_pressure and regulator.pressure_margin"
         )
+    return bottle

@@ -85,10 +85,6 @@ class MeteredRuns:
                 self._count(1)
         from_meters = [name for name in task.metrics if name not in metrics]
         metrics |= task.read(from_meters, states, slice(None), None)
-        self._store_ends(task, states, metrics)
-
-    def _store_ends(self, task: "_MeteredBatch", states: Floats, metrics: Mapping[str, Floats]) -> None:
-        """Store ends and metrics of runs, with nan for failed runs; ``states`` (rows, runs) are final."""
         members, result = task.members, group_of("result", task.batch.program.state_rows(), states)
         # As for a single run: valid throughout, and finite at the end. The rows of meters do not matter.
         is_completed = (result.failure_time >= NEVER_FAILED) & np.isfinite(states[: task.physical]).all(axis=0)
