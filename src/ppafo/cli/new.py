@@ -50,24 +50,6 @@ def example_files(name: str) -> dict[PurePosixPath, bytes]:
     return dict(sorted(files.items()))
 
 
-def write_example(name: str, folder: Path) -> CommandOutput:
-    """Write all files of an example into a new folder, or none; the output names the next command."""
-    from ppafo.storage.files import replace_folder
-
-    examples = load_examples()
-    if name not in examples:
-        raise DataError(f"there is no example '{name}'{known_names(name, examples)}")
-    example = examples[name]
-    if os.path.lexists(folder):
-        raise DataError(f"{folder}: already exists; remove it or choose another with --out")
-    files = example_files(name)
-    replace_folder(folder, {str(path): content for path, content in files.items()})
-    lines = [f"written: {folder}, {', '.join(map(str, files))}", f"page: {example['page']}"]
-    lines += ["run there:", *(f"  {command}" for command in example["commands"])]
-    document = {"name": name, "folder": str(folder), "files": [str(path) for path in files], **example}
-    return CommandOutput("\n".join(lines), document)
-
-
 @dataclass(frozen=True, slots=True)
 class _NewFile:
     """Kind of input file: noun, folder of bundled files, loader, and command to try next.
@@ -128,6 +110,8 @@ def new(
     >>> print(new("set", "mine").text)
     written: mine.toml; next: ppafo sets audit mine.toml
     """
+    from ppafo.storage.files import replace_folder, write_file
+
     if kind == EXAMPLE:
         if source is not None or (name is None and out is not None):
             raise DataError(
@@ -136,11 +120,23 @@ def new(
                 else "--out: needs the NAME of the example to write"
             )
 
-        if name is not None:
-            return write_example(name, out or Path(name))
-        rows = [{"name": name, **example} for name, example in load_examples().items()]
-        examples = listing("example", rows, ("name", "summary"))
-        return replace(examples, text=f"{examples.text}\n\nppafo new example NAME writes one into a new folder.")
+        examples = load_examples()
+        if name is None:
+            rows = [{"name": name, **example} for name, example in examples.items()]
+            listed = listing("example", rows, ("name", "summary"))
+            return replace(listed, text=f"{listed.text}\n\nppafo new example NAME writes one into a new folder.")
+        folder = out or Path(name)
+        if name not in examples:
+            raise DataError(f"there is no example '{name}'{known_names(name, examples)}")
+        example = examples[name]
+        if os.path.lexists(folder):
+            raise DataError(f"{folder}: already exists; remove it or choose another with --out")
+        files = example_files(name)
+        replace_folder(folder, {str(path): content for path, content in files.items()})
+        lines = [f"written: {folder}, {', '.join(map(str, files))}", f"page: {example['page']}"]
+        lines += ["run there:", *(f"  {command}" for command in example["commands"])]
+        document = {"name": name, "folder": str(folder), "files": [str(path) for path in files], **example}
+        return CommandOutput("\n".join(lines), document)
     known = (*KINDS, EXAMPLE)
     if kind not in known:
         raise DataError(f"there is no kind of file '{kind}'{known_names(kind, known)}")
@@ -152,8 +148,6 @@ def new(
         raise DataError(f"--out {path}: the name must end in {_SUFFIX}")
     if os.path.lexists(path):
         raise DataError(f"{path}: already exists; remove it or choose another name")
-    from ppafo.storage.files import write_file
-
     load = kind_at(chosen.load)
     write_file(path, _content(kind, source, name, path).encode())
     # A copy that does not load, such as one with a path relative to another folder, is not left.

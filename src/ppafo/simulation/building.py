@@ -66,8 +66,8 @@ def build_scenario(reading: DocumentReader) -> Scenario:
 
     Raises ScenarioError or ParameterError for the first value that cannot be used.
     """
-    document = reading.document
-    hardware = read_hardware(reading)
+    document, kind = reading.document, kind_at(reading.document, "controller")
+    law, hardware = CONTROLLERS[kind], read_hardware(reading)
     device = read_device(reading, hardware)
     # Refusals are in the units of the set.
     with shown_in(device.shown):
@@ -77,7 +77,15 @@ def build_scenario(reading: DocumentReader) -> Scenario:
         with noted_in(wrong):
             of_sensors = reading.section("sensors", SENSORS)
         with noted_in(wrong):
-            controlled = _controlled(reading)
+            controlled = controlled_in(document)
+            if law.needs_reference and controlled not in law.controls:
+                able = ", ".join(name for name, other in CONTROLLERS.items() if controlled in other.controls)
+                follows = " or ".join(CONTROLLED[name].words for name in law.controls)
+                remedy = f'give [reference] of = "{law.controls[0]}", or set controller.kind to one of {able}'
+                # A reference that says nothing is of a torque, which a law of another quantity cannot follow.
+                path = REFERENCE_OF if value_at(document, REFERENCE_OF) is not None else "controller.kind"
+                follows = f"follows a reference of {follows}, not {controlled}; {remedy}"
+                raise reading.refusal(path, f"the controller '{kind}' {follows}")
             reference, reference_links = _reference(reading, controlled, device.supply.atmospheric_pressure)
         with noted_in(wrong):
             initial, initial_links = _initial(reading, device)
@@ -87,7 +95,6 @@ def build_scenario(reading: DocumentReader) -> Scenario:
         assert section is not None, "walks are built from another layout"
         motion = section.read(reading, reading.folder)
         supply_line = read_supply_line(reading)
-        kind = kind_at(document, "controller")
         assumptions = read_assumptions(reading, hardware)
         scenario = Scenario(
             name=document["name"],
@@ -107,7 +114,6 @@ def build_scenario(reading: DocumentReader) -> Scenario:
             controlled=controlled,
             beyond_reach=str(value_at(document, PURPOSE) or ""),
         )
-        law = CONTROLLERS[kind]
         scenario = with_settings(reading, scenario, law_settings(law, controlled))
         problem = reference_problem(scenario)
         if problem:
@@ -199,20 +205,6 @@ def with_settings(reading: DocumentReader, scenario: Scenario, declared: tuple[Q
     of_controller = {path.removeprefix("controller."): number for path, number in settings.items()}
     control = replace(scenario.controller, settings=of_controller)
     return replace(scenario, controller=control, links={**scenario.links, **links})
-
-
-def _controlled(reading: DocumentReader) -> str:
-    """Return the controlled quantity of the reference; ScenarioError if the controller cannot follow this quantity."""
-    controlled, kind = controlled_in(reading.document), kind_at(reading.document, "controller")
-    law = CONTROLLERS[kind]
-    if not law.needs_reference or controlled in law.controls:
-        return controlled
-    able = ", ".join(name for name, other in CONTROLLERS.items() if controlled in other.controls)
-    follows = " or ".join(CONTROLLED[name].words for name in law.controls)
-    remedy = f'give [reference] of = "{law.controls[0]}", or set controller.kind to one of {able}'
-    # A reference that says nothing is of a torque, which a law of another quantity cannot follow.
-    path = REFERENCE_OF if value_at(reading.document, REFERENCE_OF) is not None else "controller.kind"
-    raise reading.refusal(path, f"the controller '{kind}' follows a reference of {follows}, not {controlled}; {remedy}")
 
 
 def _reference(reading: DocumentReader, controlled: str, atmosphere: float) -> tuple[ProfileChoice, Graph]:

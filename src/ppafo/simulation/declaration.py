@@ -81,8 +81,6 @@ SUPPLY_LINE = "supply_line"
 SUPPLY_LINES = tuple(line.name for line in fields(SupplyLine))
 _REGULATED = quantities_of(RegulatedLine)
 
-TEXTS = ("name", "description", "device.set", "device.valve")
-
 HEAD: dict[str, Field] = {
     "schema_version": Words("version of this layout", True, (1,)),
     "name": Words(required=True, pattern=SHORT_NAME),

@@ -3,7 +3,8 @@
 from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import fields, replace
-from typing import Any, TypeVar
+from types import UnionType
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from ppafo.arguments.values import shown, taken_number
 from ppafo.errors import ScenarioError
@@ -22,22 +23,12 @@ from ppafo.parameters.declaration import (
 )
 from ppafo.parameters.device import Device, Orifice, SonicOrifice, held_in
 from ppafo.parameters.effects import number_under, part_of
-from ppafo.parameters.graph import Asked, Graph, Link, holding, left, resolved
+from ppafo.parameters.graph import Asked, Graph, Link, left, resolved
 from ppafo.parameters.overrides import one_path, read_overrides
 from ppafo.simulation.declaration import LOCKED_ANGLE
 from ppafo.simulation.default_gains import default_links
 from ppafo.simulation.profiles import disordered_knots, profiles_of
-from ppafo.simulation.scenario import (
-    Control,
-    GasModel,
-    Initial,
-    Origin,
-    ProfileChoice,
-    RunSettings,
-    Scenario,
-    Sensors,
-    SupplyLine,
-)
+from ppafo.simulation.scenario import Motion, Scenario
 from ppafo.units import SI
 from ppafo.units.shown import in_units, written_text
 
@@ -52,22 +43,6 @@ _RATE, _PERIOD = "controller.rate", "controller.period"
 
 
 _OF_JOINT = ("actuator.", "friction.", "foot_plate.")
-_PARTS = {
-    "name": str,
-    "description": str,
-    "assumptions": tuple,
-    "run": RunSettings,
-    "device": Device,
-    "initial": Initial,
-    "controller": Control,
-    "reference": ProfileChoice,
-    "sensors": Sensors,
-    "origin": Origin,
-    "gas_model": GasModel,
-    "supply_line": SupplyLine,
-    "links": Mapping,
-}
-"""Class of each attribute of a scenario, for any motion; two attributes may be None."""
 _ACCEPTED: deque[Scenario] = deque(maxlen=16)
 """Scenarios that were checked last; frozen, so that repeated simulation needs no new check."""
 
@@ -85,15 +60,15 @@ def check_parts(scenario: Scenario) -> None:
     def refusal(path: str, value: Any, rule: str) -> ScenarioError:
         return ScenarioError(f"{scenario.name}: {path} = {shown(value)}: {rule}")
 
-    for name, kind in _PARTS.items():
-        part = getattr(scenario, name)
-        if not isinstance(part, kind) and not (part is None and kind in (GasModel, SupplyLine)):
-            raise refusal(
-                name, part, "must be a text" if kind is str else f"must be an object of class {kind.__name__}"
-            )
+    # The class of each attribute is that of its annotation, which of some has parts or None beside it.
+    for name, hint in get_type_hints(Scenario).items():
+        part, kind = getattr(scenario, name), hint if isinstance(hint, UnionType) else get_origin(hint) or hint
+        if kind is not Motion and not isinstance(part, kind):
+            of_class = f"an object of class {(*get_args(kind), kind)[0].__name__}"
+            raise refusal(name, part, f"must be {'a text' if kind is str else of_class}")
     if not hasattr(scenario.motion, "motion_kind"):
         raise refusal("motion", scenario.motion, "must be a motion object such as FreeMotion")
-    if not isinstance(scenario.controlled, str) or scenario.controlled not in CONTROLLED:
+    if scenario.controlled not in CONTROLLED:
         raise refusal("controlled", scenario.controlled, f"must be one of {', '.join(CONTROLLED)}")
     absent = _numbers_of_other_form(scenario.device) | {_RATE}
     to_float, named_effects = taken_number(), scenario.device.effects
@@ -207,11 +182,6 @@ def _moved(scenario: Scenario, replaced: Mapping[str, Any]) -> tuple[dict[str, A
             # This finds the sources in the other form.
             link.number(_present(changed).__getitem__)
     return resolved(scenario.graph, replaced, _present(scenario), anew), changed, anew
-
-
-def links_that_hold(scenario: Scenario) -> Graph:
-    """Return the links of a scenario that still apply: without numbers changed since it was loaded."""
-    return holding(scenario.graph, _present(scenario))
 
 
 def _present(scenario: Scenario) -> Asked:

@@ -50,7 +50,12 @@ def override_document(request: DocumentReader, content: Content = OF_A_VANE) -> 
     own = {path: override for path, override in override_at.items() if path not in of_device}
     remaining = _choose_kinds(changed, own, file, content)
     known = content.paths(changed) if own else ()
-    wrong: list[PpafoError] = [_unknown(own, path, (*known, *content.same), file) for path in own if path not in known]
+    wrong: list[PpafoError] = []
+    for path in (path for path in own if path not in known):
+        # A newly chosen kind may have made it unknown.
+        deciding = deciding_kinds(path, filter(_is_kind_path, own))
+        after = f" after override '{own[deciding[-1]]}'" if deciding else ""
+        wrong.append(unknown_value(own[path], (*known, *content.same), f"{file}{after} has"))
     for path in remaining:
         if path not in known:
             continue
@@ -70,13 +75,6 @@ def override_document(request: DocumentReader, content: Content = OF_A_VANE) -> 
         kept=kept,
         wrong=tuple(wrong),
     )
-
-
-def _unknown(own: Mapping[str, Override], path: str, known: tuple[str, ...], file: str) -> ScenarioError:
-    """Return the error for an override of an unknown path, which a newly chosen kind may have made unknown."""
-    deciding = deciding_kinds(path, filter(_is_kind_path, own))
-    after = f" after override '{own[deciding[-1]]}'" if deciding else ""
-    return unknown_value(own[path], known, f"{file}{after} has")
 
 
 def _kept_text(

@@ -463,6 +463,13 @@ def vane_motion(scenario: Scenario) -> VaneMotion:
     raise ScenarioError(f"{scenario.name}: its motion is {scenario.motion.label}, but it must not walk here")
 
 
+def sensor_noise(scenario: Scenario) -> Any:
+    """Sum of all noise levels and lost fractions of the controller's sensors, which is 0 only without noise."""
+    forces = getattr(scenario.motion, "forces", {}).items()
+    own = (number for name, number in forces if name == "force_noise" or name.endswith("lost_share"))
+    return sum(own, scenario.sensors.angle_noise + scenario.sensors.pressure_noise)
+
+
 def scenario_document(scenario: Scenario) -> dict[str, Any]:
     """Return the whole scenario with every number of the device, in SI units, as data that can be written as JSON."""
     return {"units": UNITS, **plain(scenario)}

@@ -24,9 +24,10 @@ from ppafo.model.catalog import ordered_effects
 from ppafo.model.declaration import PlainFunction
 from ppafo.model.effects.kind import Effect
 from ppafo.parameters.effects import effects_of
+from ppafo.parameters.graph import Asked, holding
 from ppafo.simulation.clock import links_of_times, time_texts
 from ppafo.simulation.motion_kind import WALK
-from ppafo.simulation.numbers import links_that_hold
+from ppafo.simulation.numbers import numbers_at
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.wording import argument_text
@@ -78,7 +79,8 @@ def library_of(scenario: Scenario) -> Library:
     program, device = exporting.program, scenario.device
     settings = settings_of(scenario, record_interval(scenario.run.duration) if is_walk else None)
     places = {setting.path: float(place) for place, setting in enumerate(settings, 1)}
-    links = {**links_that_hold(scenario)}
+    # Numbers that were changed since the scenario was loaded follow nothing any more.
+    links = dict(holding(scenario.graph, Asked(partial(numbers_at, scenario))))
     links |= of_walk.LINKS_OF_WALK if is_walk else links_of_times(time_texts(scenario))
     links = {path: follows for path, follows in links.items() if path in places}
     preparation, plant = Preparation(scenario, program, places), "prepared->parameters.plant"

@@ -14,22 +14,13 @@ from ppafo.parameters.declaration import OF_SECOND_CHAMBER, WHY_ONE_CHAMBER
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import either, in_two_forms
 from ppafo.simulation.contradictions import check_no_bottle
-from ppafo.simulation.declaration import TEXTS, WALL_AREA
+from ppafo.simulation.declaration import WALL_AREA
 from ppafo.simulation.numbers import chosen_path, declared_numbers, moving_together
 from ppafo.simulation.scenario import Scenario
 from ppafo.wording import nearest_name
 
-_TEXTS = (
-    *TEXTS,
-    "gas.species",
-    "supply.relieving",
-    "motion.kind",
-    "controller.kind",
-    "reference.kind",
-    "motion.profile.kind",
-    "motion.shank.kind",
-    "motion.shank.gait",
-)
+_TEXTS = frozenset({"name", "description", "set", "valve", "species", "relieving", "kind", "gait"})
+"""Keys of texts, and of true or false, in a scenario or its device."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +91,7 @@ def absolute(base: Scenario, columns: Mapping[str, Floats], gauge: Collection[st
 
 def _why_not(base: Scenario, typed: str, path: str, declared: Mapping[str, Quantity]) -> str:
     """Return the reason why the number at a path cannot vary in an ensemble."""
-    if path in _TEXTS:
+    if path.rpartition(".")[2] in _TEXTS:
         return f"'{typed}' is a text and cannot vary; run an ensemble for each value"
     if base.controller.is_outside and path.startswith("controller."):
         return f"'{typed}' cannot vary: a Python controller object has no declared settings"
