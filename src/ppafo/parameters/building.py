@@ -104,10 +104,25 @@ def read_device(parameter_set: ParameterSet, name: str, links: Graph) -> Device:
         # The port of the second chamber is at the atmosphere and passes nothing.
         supply["dorsiflexion_pressure"] = supply["atmospheric_pressure"]
     relieving = parameter_set.texts.get(declaration.RELIEVING_PATH)
+    moves, has_one_chamber = ACTUATORS[parameter_set.actuator_kind], parameter_set.has_one_chamber
+    gas = Gas(species, **read("gas", declaration.GAS))
+    sizes = read("actuator", _present(parameter_set, "actuator"))
     return Device(
         name=parameter_set.name,
-        gas=Gas(species, **read("gas", declaration.GAS)),
-        actuator=_actuator(parameter_set, read),
+        gas=gas,
+        actuator=Actuator(
+            torque_constant=sizes.get("torque_constant", 0.0),
+            displacement_per_radian=sizes.get("displacement_per_radian", 0.0),
+            angle_min=sizes["angle_min"],
+            angle_max=sizes["angle_max"],
+            dead_volume_1=sizes["dead_volume_1"],
+            dead_volume_2=_UNUSED_VOLUME if has_one_chamber else sizes["dead_volume_2"],
+            restitution=sizes["restitution"],
+            leak=_NO_LEAK if has_one_chamber else _orifice(parameter_set, read, "actuator.leak"),
+            kind=parameter_set.actuator_kind,
+            settings={} if moves.name == VANE else {setting.name: sizes[setting.name] for setting in moves.quantities},
+            table=parameter_set.actuator_table,
+        ),
         friction=Friction(**read("friction", declaration.FRICTION)),
         foot_plate=FootPlate(**read("foot_plate", declaration.FOOT_PLATE)),
         supply=Supply(**supply, relieving=relieving is not None and relieving.value is True),
@@ -201,26 +216,6 @@ def _present(parameter_set: ParameterSet, section: str) -> tuple[Quantity, ...]:
     absent = declaration.OF_SECOND_CHAMBER if parameter_set.has_one_chamber else frozenset()
     members = declaration.members(section, parameter_set.actuator_kind)
     return tuple(member for member in members if f"{section}.{member.name}" not in absent)
-
-
-def _actuator(parameter_set: ParameterSet, read: Reader) -> Actuator:
-    """Return the actuator of a set: a vane, or another actuator with its settings."""
-    kind = ACTUATORS[parameter_set.actuator_kind]
-    numbers = read("actuator", _present(parameter_set, "actuator"))
-    has_one_chamber = parameter_set.has_one_chamber
-    return Actuator(
-        torque_constant=numbers.get("torque_constant", 0.0),
-        displacement_per_radian=numbers.get("displacement_per_radian", 0.0),
-        angle_min=numbers["angle_min"],
-        angle_max=numbers["angle_max"],
-        dead_volume_1=numbers["dead_volume_1"],
-        dead_volume_2=_UNUSED_VOLUME if has_one_chamber else numbers["dead_volume_2"],
-        restitution=numbers["restitution"],
-        leak=_NO_LEAK if has_one_chamber else _orifice(parameter_set, read, "actuator.leak"),
-        kind=parameter_set.actuator_kind,
-        settings={} if kind.name == VANE else {quantity.name: numbers[quantity.name] for quantity in kind.quantities},
-        table=parameter_set.actuator_table,
-    )
 
 
 def _shape_problem(actuator: Actuator) -> Problem:

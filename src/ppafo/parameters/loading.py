@@ -33,7 +33,7 @@ from ppafo.parameters.declared import (
 )
 from ppafo.parameters.device import VANE, Device
 from ppafo.parameters.joint import ANKLE, OPPOSITES, JointNames
-from ppafo.parameters.opening_table import entries_of_opening, fields_of_opening
+from ppafo.parameters.opening_table import COLUMNS, SIZE, entries_of_opening
 from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
 from ppafo.parameters.parameter_set import (
     CITATION,
@@ -181,8 +181,14 @@ def declared(document: Mapping[str, Any]) -> dict[str, Field]:
         "reported.valves": InnerTable("reported values of the valves, by valve name", keys=FREE_KEY),
         **{f"valves.{name}.kind": Words("", True, VALVES) for name in names},
     }
-    for name in (name for name, kind in kinds.items() if kind == "proportional"):
-        fields |= fields_of_opening(name)
+    for path in (f"valves.{name}.opening" for name, kind in kinds.items() if kind == "proportional"):
+        file = "CSV file with the columns command and opening, relative to the folder of the set"
+        fields |= {
+            path: InnerTable("opening over the command, in place of a straight line beyond the dead band"),
+            f"{path}.file": Words(file),
+            **{f"{path}.{name}": Many(SIZE, f"{name} of each node, from 0 to 1") for name in COLUMNS},
+            **{f"{path}.{name}": TEXT_ENTRY[name] for name in ("origin", "source", "note")},
+        }
     for path, quantity in quantities.items():
         if not (path.startswith("valves.") and path.split(".")[1] not in known):
             fields |= inside(path, NUMBER_ENTRY, f"{quantity.summary} [{quantity.unit or '-'}]")
@@ -222,7 +228,16 @@ def _parameter_set(document: Mapping[str, Any], fields: Fields, file: str, folde
             is_read = ACTUATORS[kind].model.table is Measured
             table = read_actuator_table(folder / actuator["file"]) if is_read else None
     citation = document.get("citation")
-    parent, joint = document.get("parent", ""), document.get("joint")
+    parent, joint = document.get("parent", ""), ANKLE
+    if words := document.get("joint"):
+        positive = words["positive"]
+        negative = words.get("negative") or OPPOSITES.get(positive)
+        if negative is None:
+            raise ParameterError(
+                f"{file}: joint.positive = '{positive}': the name of the opposite direction is unknown"
+                f"{nearest_name(positive, OPPOSITES)}; also give joint.negative"
+            )
+        joint = JointNames(words["name"], positive, negative)
     return ParameterSet(
         file=file,
         **{name: document.get(name, "") for name in ("name", "title", "notes", "completed_by", "default_valve")},
@@ -235,20 +250,8 @@ def _parameter_set(document: Mapping[str, Any], fields: Fields, file: str, folde
         numbers=numbers,
         texts=texts,
         accepted={item["finding"]: item["reason"] for item in document.get("accepted", ())},
-        joint=ANKLE if joint is None else _joint_names(joint, file),
+        joint=joint,
     )
-
-
-def _joint_names(words: Mapping[str, str], file: str) -> JointNames:
-    """Return the names of the joint of a validated file. Raises ParameterError without a name for a falling angle."""
-    negative = words.get("negative") or OPPOSITES.get(words["positive"])
-    if negative is None:
-        hint = nearest_name(words["positive"], OPPOSITES)
-        raise ParameterError(
-            f"{file}: joint.positive = '{words['positive']}': the name of the opposite direction is unknown{hint}; "
-            "also give joint.negative"
-        )
-    return JointNames(words["name"], words["positive"], negative)
 
 
 def json_schema() -> dict[str, Any]:

@@ -18,24 +18,13 @@ from ppafo.errors import ParameterError, PpafoError, raise_noted
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION
 from ppafo.model.effects.opening import NODES
-from ppafo.parameters.declared import Field, InnerTable, Many, Words
 from ppafo.parameters.number_table import lines_of_table, numbers_of_table
-from ppafo.parameters.parameter_set import TEXT_ENTRY, Entry
+from ppafo.parameters.parameter_set import Entry
 from ppafo.wording import one_line
 
 COLUMNS = ("command", "opening")
-_SIZE = Quantity("", "", "size", None, 0.0, 1.0, plain=True)
-
-
-def fields_of_opening(valve: str) -> dict[str, Field]:
-    """Return the fields of the table of a valve by path."""
-    path = f"valves.{valve}.opening"
-    return {
-        path: InnerTable("opening over the command, in place of a straight line beyond the dead band"),
-        f"{path}.file": Words("CSV file with the columns command and opening, relative to the folder of the set"),
-        **{f"{path}.{name}": Many(_SIZE, f"{name} of each node, from 0 to 1") for name in COLUMNS},
-        **{f"{path}.{name}": TEXT_ENTRY[name] for name in ("origin", "source", "note")},
-    }
+SIZE = Quantity("", "", "size", None, 0.0, 1.0, plain=True)
+"""Size of a command or an opening [-]."""
 
 
 def entries_of_opening(table: Mapping[str, Any], folder: Path, where: str) -> dict[str, Entry]:

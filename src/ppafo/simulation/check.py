@@ -337,7 +337,13 @@ def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
     starts = [start_moved(run, move, opposite) for opposite in (1.0, -1.0) for move in (MOVE, -MOVE)]
     runs = [(FINER, finer(run)), *((MOVED_START, moved) for moved in starts)]
     if not run.program.ideal_sensors:
-        runs += [(MOVED_MEASUREMENT, noisy) for noisy in _measurement_moved(run, _signal_range(result, "Pa"))]
+        sensors, angles, pressures = run.sensors, _signal_range(result, "rad"), _signal_range(result, "Pa")
+        # One draw alone seldom crosses a step of a coarse sensor without noise.
+        draws = 1 if sensors.angle_noise or sensors.pressure_noise else DRAWS
+        for draw, move in product(range(draws), (MOVE, -MOVE)):
+            noise = sensors.angle_noise + move * angles, sensors.pressure_noise + move * pressures
+            changed = sensors._replace(angle_noise=noise[0], pressure_noise=noise[1], seed=sensors.seed + draw)
+            runs.append((MOVED_MEASUREMENT, replace(run, sensors=changed)))
     results = rerun([planned for _, planned in runs])
     repeats = [(kind, repeat) for (kind, _), repeat in zip(runs, results, strict=True)]
     courses, metrics = [], []
@@ -365,22 +371,6 @@ def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
         parts_at=min(separations, default=None),
         failed=tuple(dict.fromkeys(kind for kind, repeat in repeats if not repeat.status.is_completed)),
     )
-
-
-def _measurement_moved(run: Run, pressures: float) -> list[Run]:
-    """Runs with slightly changed sensor noise, relative to the ranges of angle [rad] and pressure [Pa]."""
-    sensors, angles = run.sensors, run.plant.angle_max - run.plant.angle_min
-    # One draw alone seldom crosses a step of a coarse sensor without noise.
-    draws = 1 if sensors.angle_noise or sensors.pressure_noise else DRAWS
-    noisy = (
-        sensors._replace(
-            angle_noise=sensors.angle_noise + move * angles,
-            pressure_noise=sensors.pressure_noise + move * pressures,
-            seed=sensors.seed + draw,
-        )
-        for draw, move in product(range(draws), (MOVE, -MOVE))
-    )
-    return [replace(run, sensors=changed) for changed in noisy]
 
 
 def start_moved(run: Run, move: float, opposite: float) -> Run:

@@ -44,10 +44,12 @@ from ppafo.simulation.numbers import path_of_locked_angle
 from ppafo.simulation.plan import plan_vane
 from ppafo.simulation.profiles import (
     Limits,
+    ProfileCourse,
     disordered_knots,
+    excursion,
     limits_of,
     profile_bounds,
-    profile_problem,
+    profile_parameters,
     profiles_of,
     read_profile,
 )
@@ -109,8 +111,12 @@ def _beyond(scenario: Scenario, limits: Limits, profile: ProfileChoice, section:
         profile_of_run = ProfileChoice(profile.kind, settings)
         lowest, highest, room = (at(number, run) for number in (limits.lowest, limits.highest, limits.room))
         limits_of_run = limits._replace(lowest=lowest, highest=highest, room=room)
-        problems[run] = profile_problem(limits_of_run, profile_of_run, duration, step, section)
-        outside[run] = bool(problems[run])
+        course, numbers = ProfileCourse(PROFILES[profile.kind].value), profile_parameters(profile_of_run)
+        moment, reached = excursion(numbers, *limits_of_run.allowed, duration, step, parts=course)
+        outside[run] = moment >= 0.0
+        ends = f"{limits_of_run.text(lowest)} to {limits_of_run.text(highest)}"
+        found = f"{limits_of_run.text(reached)} at {moment:.6g} s"
+        problems[run] = f"[{section}] leaves {limits.words}, {ends}: {found}"
     return outside, lambda run: problems[run]
 
 

@@ -175,7 +175,15 @@ def compose_run(
         effects=effect_rows(device, sections),
         leg=led,
     )
-    return run, (too_many_steps(scenario, run.step, run.step_count), *problems)
+
+    def too_many_steps(of_run: int) -> str:
+        duration, length, count = (at(each, of_run) for each in (scenario.run.duration, run.step, run.step_count))
+        return (
+            f"run.duration = {duration:.6g} s takes {count:.3g} steps of {length:.3g} s, at most {MAXIMUM_STEPS:.0e} "
+            "are allowed: shorten the run or increase run.step"
+        )
+
+    return run, ((run.step_count > MAXIMUM_STEPS, too_many_steps), *problems)
 
 
 def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, tuple[Problem, ...]]:
@@ -218,19 +226,6 @@ def time_grid(scenario: Scenario, plant: PlantParameters) -> TimeGrid:
 def relative_tolerance(tolerance: float) -> float:
     """Allowed pressure error divided by the default allowed error [-], from ``run.tolerance`` [-]."""
     return tolerance / KEPT_OF_PRESSURE
-
-
-def too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem:
-    """Problem of runs with more than the maximum number of steps; ``step`` in s."""
-
-    def line(run: int) -> str:
-        duration, length, count = (at(number, run) for number in (scenario.run.duration, step, step_count))
-        return (
-            f"run.duration = {duration:.6g} s takes {count:.3g} steps of {length:.3g} s, at most {MAXIMUM_STEPS:.0e} "
-            "are allowed: shorten the run or increase run.step"
-        )
-
-    return step_count > MAXIMUM_STEPS, line
 
 
 def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:

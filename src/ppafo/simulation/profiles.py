@@ -120,20 +120,6 @@ def limits_of(device: Device, followed: ControlledQuantity) -> Limits:
     return Limits(words=words, lowest=lowest, highest=highest, unit=followed.level.unit, room=room)
 
 
-def profile_problem(
-    limits: Limits, profile: ProfileChoice, duration: float, step: float, section: str = "motion.profile"
-) -> str:
-    """Return a sentence on the time at which a section's profile leaves its limits; "" if it stays within."""
-    course = ProfileCourse(PROFILES[profile.kind].value)
-    moment, reached = excursion(profile_parameters(profile), *limits.allowed, duration, step, parts=course)
-    if moment < 0.0:
-        return ""
-    return (
-        f"[{section}] leaves {limits.words}, {limits.text(limits.lowest)} to {limits.text(limits.highest)}: "
-        f"{limits.text(reached)} at {moment:.6g} s"
-    )
-
-
 class ProfileCourse(NamedTuple):
     """Function that returns value, rate and second derivative of a profile at a time [s]."""
 

@@ -1,7 +1,8 @@
 """Planning of an ensemble: batches of columns with one program and one clock; contradictory runs are refused."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -72,7 +73,8 @@ def screen_columns(columns: ScenarioColumns) -> _ValidRuns:
             valid.refuse(is_bad, line)
     # After each problem that some runs have, the others are checked again: their numbers may have fewer.
     while valid.members.size:
-        problem = _first_problem(_contradictory_numbers(valid.scenario))
+        of_device = (problem for _, problem in contradictions(valid.scenario.device))
+        problem = _first_problem(chain(of_device, problems_of(valid.scenario)))
         if problem is None:
             break
         valid.refuse(*problem)
@@ -141,9 +143,3 @@ def _groups_of_one_program(scenario: Scenario, runs: int) -> list[Members]:
 def _first_problem(problems: Iterable[Problem]) -> Problem | None:
     """First problem that any run has; None if no run has one."""
     return next((problem for problem in problems if np.any(problem[0])), None)
-
-
-def _contradictory_numbers(scenario: Scenario) -> Iterator[Problem]:
-    """Yield the problems of contradictory numbers of a scenario of many runs; later checks rely on earlier ones."""
-    yield from (problem for _, problem in contradictions(scenario.device))
-    yield from problems_of(scenario)
