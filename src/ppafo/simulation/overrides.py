@@ -65,35 +65,28 @@ def override_document(request: DocumentReader, content: Content = OF_A_VANE) -> 
         else:
             with noted_in(wrong):
                 _set(changed, path, own[path].text, file, content)
-    kept = _kept_text(document, changed, own, content)
+    # What sections keep although another kind is chosen for them.
+    old_kinds = {path: value_at(document, path) for path in filter(_is_kind_path, own)}
+    of_old, of_new = (quantities_in(content.declare(each)) if old_kinds else {} for each in (document, changed))
+    kept: dict[str, list[str]] = {}
+    for path, quantity in of_new.items():
+        deciding, value = deciding_kinds(path, old_kinds)[-1:], value_at(changed, path)
+        if not deciding or value is None or path in own or path.rpartition(".")[2] in _SAMPLING:
+            continue
+        old, new = old_kinds[deciding[0]], own[deciding[0]].text
+        if old not in (None, new):
+            # The meaning is news where both kinds do not have the same one.
+            meaning = "" if path in of_old and of_old[path].summary == quantity.summary else f" ({quantity.summary})"
+            kept.setdefault(f"kept from {old} for {new}", []).append(f"{path}={value}{meaning}")
     return replace(
         request,
         document=changed,
         content=document,
         overridden=frozenset(own),
         device=tuple(of_device.values()),
-        kept=kept,
+        kept="; ".join(f"{lead}: {', '.join(numbers)}" for lead, numbers in kept.items()),
         wrong=tuple(wrong),
     )
-
-
-def _kept_text(
-    before: Mapping[str, Any], changed: Mapping[str, Any], override_at: Mapping[str, Override], content: Content
-) -> str:
-    """Return a sentence on the numbers that sections keep although another ``kind`` is chosen for them."""
-    old_kinds = {path: value_at(before, path) for path in filter(_is_kind_path, override_at)}
-    of_old, of_new = (quantities_in(content.declare(each)) if old_kinds else {} for each in (before, changed))
-    kept: dict[str, list[str]] = {}
-    for path, quantity in of_new.items():
-        deciding, value = deciding_kinds(path, old_kinds)[-1:], value_at(changed, path)
-        if not deciding or value is None or path in override_at or path.rpartition(".")[2] in _SAMPLING:
-            continue
-        old, new = old_kinds[deciding[0]], override_at[deciding[0]].text
-        if old not in (None, new):
-            # The meaning is news where both kinds do not have the same one.
-            meaning = "" if path in of_old and of_old[path].summary == quantity.summary else f" ({quantity.summary})"
-            kept.setdefault(f"kept from {old} for {new}", []).append(f"{path}={value}{meaning}")
-    return "; ".join(f"{lead}: {', '.join(numbers)}" for lead, numbers in kept.items())
 
 
 def over_layer(

@@ -69,7 +69,22 @@ def read_netcdf(path: str | Path) -> Recording:
     content = read_bytes(path)
     try:
         with h5py.File(io.BytesIO(content), "r") as file:
-            variables = _own_variables(file)
+            # Numbers over time alone, in the file itself.
+            variables = dict(own_items(file))
+            if TIME not in variables:
+                raise DataError(f"has no variable '{TIME}'")
+            for name, variable in variables.items():
+                if len(getattr(variable, "shape", None) or ()) != 1 or variable.dtype.kind not in _KINDS_OF_NUMBERS:
+                    raise DataError(f"'{name}' must be numeric and one-dimensional over '{TIME}'")
+            for name, variable in variables.items():
+                if variable.size != variables[TIME].size:
+                    raise DataError(f"'{name}' has {variable.size} values for {variables[TIME].size} times")
+                # Only the common filters: gzip within gzip grows without limit.
+                properties = variable.id.get_create_plist()
+                filters = [properties.get_filter(number)[0] for number in range(properties.get_nfilters())]
+                behind_gzip = filters[filters.index(_GZIP) + 1 :] if _GZIP in filters else []
+                if not set(filters) <= _SUPPORTED_FILTERS or not set(behind_gzip) <= {_FLETCHER}:
+                    raise DataError(f"'{name}' has an unsupported compression")
             # Before memory is allocated: numbers must not need far more than the size of the file.
             chunks = [math.prod(item.chunks) * item.dtype.itemsize for item in variables.values() if item.chunks]
             required = sum(chunks) + sum(_BYTES_OF_A_FLOAT * item.size for item in variables.values())
@@ -105,26 +120,6 @@ def own_items(group: Any) -> Iterator[tuple[str, Any]]:
                 f"the numbers of '{one_line(name)}' are stored in another file; save them in the file itself"
             )
         yield name, node
-
-
-def _own_variables(file: Any) -> dict[str, Any]:
-    """Return the variables of a file by name. Raises DataError for others than numbers over time."""
-    variables = dict(own_items(file))
-    if TIME not in variables:
-        raise DataError(f"has no variable '{TIME}'")
-    for name, variable in variables.items():
-        if len(getattr(variable, "shape", None) or ()) != 1 or variable.dtype.kind not in _KINDS_OF_NUMBERS:
-            raise DataError(f"'{name}' must be numeric and one-dimensional over '{TIME}'")
-    for name, variable in variables.items():
-        if variable.size != variables[TIME].size:
-            raise DataError(f"'{name}' has {variable.size} values for {variables[TIME].size} times")
-        # Only the common filters: gzip within gzip grows without limit.
-        properties = variable.id.get_create_plist()
-        filters = [properties.get_filter(number)[0] for number in range(properties.get_nfilters())]
-        behind_gzip = filters[filters.index(_GZIP) + 1 :] if _GZIP in filters else []
-        if not set(filters) <= _SUPPORTED_FILTERS or not set(behind_gzip) <= {_FLETCHER}:
-            raise DataError(f"'{name}' has an unsupported compression")
-    return variables
 
 
 def _check_is_whole(name: str, variable: Any) -> None:

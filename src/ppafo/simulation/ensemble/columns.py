@@ -58,7 +58,15 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
         # valve.area and valves.NAME.area are one number of the chosen valve.
         path = chosen_path(typed, base)
         if path not in declared:
-            raise ScenarioError(f"{base.name}: {_why_not(base, typed, path, declared)}")
+            why = "is not a number that can vary"
+            why += nearest_name(path, declared) or f"; for example {', '.join(list(declared)[:6])}"
+            if path.rpartition(".")[2] in _TEXTS:
+                why = "is a text and cannot vary; run an ensemble for each value"
+            elif base.controller.is_outside and path.startswith("controller."):
+                why = "cannot vary: a Python controller object has no declared settings"
+            elif path in OF_SECOND_CHAMBER and base.device.actuator.has_one_chamber:
+                why = f"cannot vary: {WHY_ONE_CHAMBER}"
+            raise ScenarioError(f"{base.name}: '{typed}' {why}")
         if path in values:
             raise ScenarioError(f"{base.name}: '{typed}' and '{path}' are the same value; give only one of them")
         values[path] = np.ascontiguousarray(column, dtype=np.float64)
@@ -87,15 +95,3 @@ def absolute(base: Scenario, columns: Mapping[str, Floats], gauge: Collection[st
     """Return the columns with gauge pressures converted to absolute ones by the atmosphere of each run."""
     atmosphere = columns.get(ATMOSPHERE_PATH, base.device.supply.atmospheric_pressure)
     return {path: column + atmosphere if path in gauge else column for path, column in columns.items()}
-
-
-def _why_not(base: Scenario, typed: str, path: str, declared: Mapping[str, Quantity]) -> str:
-    """Return the reason why the number at a path cannot vary in an ensemble."""
-    if path.rpartition(".")[2] in _TEXTS:
-        return f"'{typed}' is a text and cannot vary; run an ensemble for each value"
-    if base.controller.is_outside and path.startswith("controller."):
-        return f"'{typed}' cannot vary: a Python controller object has no declared settings"
-    if path in OF_SECOND_CHAMBER and base.device.actuator.has_one_chamber:
-        return f"'{typed}' cannot vary: {WHY_ONE_CHAMBER}"
-    hint = nearest_name(path, declared) or f"; for example {', '.join(list(declared)[:6])}"
-    return f"'{typed}' is not a number that can vary{hint}"
