@@ -9,8 +9,7 @@ import numpy as np
 from benchmarks.report import Line, Target, has_avx512
 from benchmarks.timing import time_in_turn
 from ppafo.engine.lanes import Batch, run_batch
-from ppafo.simulation.ensemble.columns import check_columns
-from ppafo.simulation.ensemble.planning import plan_ensemble
+from ppafo.simulation.ensemble.planning import check_columns, plan_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import number_at
 

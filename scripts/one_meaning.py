@@ -33,8 +33,7 @@ from ppafo.loading import load_scenario
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.parameters.graph import ATMOSPHERE_PATH, counts_from
 from ppafo.simulation.clock import TIMES
-from ppafo.simulation.ensemble.columns import check_columns
-from ppafo.simulation.ensemble.planning import plan_ensemble
+from ppafo.simulation.ensemble.planning import check_columns, plan_ensemble
 from ppafo.simulation.loading import list_scenarios
 from ppafo.simulation.motion_kind import VANE
 from ppafo.simulation.numbers import with_numbers

@@ -3,6 +3,7 @@
 Each mistake in the document raises an error of one line.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from ppafo.control.catalog import CONTROLLERS
@@ -11,17 +12,18 @@ from ppafo.errors import ParameterError, PpafoError, ScenarioError, noted_in, ra
 from ppafo.model.catalog import VALVES
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.declaration import WHY_ONE_CHAMBER
+from ppafo.parameters.declaration import RELIEVING_PATH, WHY_ONE_CHAMBER
 from ppafo.parameters.declared import kind_at, value_at
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph, Link, follows, gauge_link
-from ppafo.simulation.assumptions import assumed_lines, read_assumptions
+from ppafo.parameters.parameter_set import entry_text
 from ppafo.simulation.clock import read_clock
 from ppafo.simulation.contradictions import check_contradictions
 from ppafo.simulation.declaration import (
     ACCURACY,
     AT_REST,
     INITIAL,
+    OF_A_VANE,
     PURPOSE,
     SEED,
     SENSORS,
@@ -31,7 +33,9 @@ from ppafo.simulation.declaration import (
     THERMAL_GAS,
     WALL_AREA,
     law_settings,
+    line_entries,
     line_quantities,
+    quantities,
     reference_settings,
 )
 from ppafo.simulation.default_gains import default_links
@@ -39,9 +43,11 @@ from ppafo.simulation.document import REFERENCE_OF, DocumentReader, controlled_i
 from ppafo.simulation.hardware import Hardware, device_error, read_device, read_hardware
 from ppafo.simulation.motion_kind import MOTIONS
 from ppafo.simulation.numbers import number_at
+from ppafo.simulation.overrides import device_paths
 from ppafo.simulation.profiles import read_profile, reference_problem
 from ppafo.simulation.scenario import (
     PRESSURE_WORDS,
+    Assumption,
     Control,
     GasModel,
     Initial,
@@ -53,12 +59,14 @@ from ppafo.simulation.scenario import (
     Sensors,
     SupplyLine,
 )
-from ppafo.units import split_quantity
-from ppafo.units.shown import shown_in
-from ppafo.wording import nearest_name
+from ppafo.units import format_quantity, split_quantity
+from ppafo.units.shown import shown_in, written_text
+from ppafo.wording import nearest_name, one_line
 
 _NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
 """Reference of a controller that follows none."""
+_ASSUMED = "assumed"
+"""Section of a file with a note for each assumed path."""
 
 
 def build_scenario(reading: DocumentReader) -> Scenario:
@@ -247,3 +255,64 @@ def read_supply_line(reading: DocumentReader) -> SupplyLine | None:
         return None
     read = {line: reading.section(f"{SUPPLY_LINE}.{line}", line_quantities(line)) for line in SUPPLY_LINES}
     return SupplyLine(**{line: RegulatedLine(**numbers) for line, numbers in read.items()})
+
+
+def read_assumptions(reading: DocumentReader, hardware: Hardware) -> tuple[Assumption, ...]:
+    """Return all assumptions with a value; the note of an overridden assumption states the value in the file.
+
+    Raises ScenarioError for a path without a value.
+    """
+    replaced, as_written = (
+        {override.typed for override in reading.overrides},
+        replace(reading, document=reading.content),
+    )
+    notes: Mapping[str, str] = reading.document.get(_ASSUMED, {})
+    assumptions, unknown = [], []
+    for path, note in notes.items():
+        value, value_in_file = _value_text(reading, hardware, path), _value_text(as_written, hardware, path)
+        if value is None and value_in_file is None:
+            unknown.append(path)
+        if value is None:
+            continue
+        if path in replaced:
+            file_value = value_in_file if value_at(as_written.document, path) is not None else "another value"
+            assumptions.append(Assumption(path, value, f"set by an override; the scenario has {file_value}: {note}"))
+        else:
+            assumptions.append(Assumption(path, value, note))
+    if unknown:
+        known = [*OF_A_VANE.paths(reading.document), *device_paths()]
+        hints = "".join(nearest_name(path, known) for path in unknown)
+        names, has = ", ".join(f"'{one_line(path)}'" for path in unknown), "has" if len(unknown) == 1 else "have"
+        raise ScenarioError(f"{reading.file}: [{_ASSUMED}] names {names}, which {has} no value in this scenario{hints}")
+    return tuple(assumptions)
+
+
+def _value_text(reading: DocumentReader, hardware: Hardware, path: str) -> str | None:
+    """Return the value at a path as written in the file, else its default; None if there is neither."""
+    written = value_at(reading.document, path)
+    if written is not None and path in OF_A_VANE.paths(reading.document):
+        return str(written)
+    quantity = quantities(reading.document).get(path)
+    if quantity is None:
+        # A number that is not the scenario's is its device's, where the valve has a name.
+        full = f"valves.{hardware.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
+        entry = hardware.parameter_set.entries().get(full)
+        if entry is not None:
+            return entry_text(entry)
+        if path == RELIEVING_PATH:
+            return "false"
+        quantity = hardware.parameter_set.declarations().get(full)
+    if quantity is not None and quantity.default is None and quantity.follows:
+        return "the value computed from the device"
+    return None if quantity is None or quantity.default is None else written_text(quantity.default, quantity.unit)
+
+
+def assumed_lines(reading: DocumentReader) -> tuple[Assumption, ...]:
+    """Return one assumption, with its reason, for each supply-line value that the file leaves at its default."""
+    if value_at(reading.document, SUPPLY_LINE) is None:
+        return ()
+    return tuple(
+        Assumption(f"{SUPPLY_LINE}.{path}", format_quantity(entry.value, entry.unit), f"{entry.origin}: {entry.source}")
+        for path, entry in line_entries().items()
+        if value_at(reading.document, f"{SUPPLY_LINE}.{path}") is None
+    )

@@ -17,7 +17,7 @@ from ppafo.metrics.tracking import ONE_INSTANT
 from ppafo.progress import Progress, Report
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble import COMPLETED, run_ensemble
-from ppafo.simulation.ensemble.columns import absolute
+from ppafo.simulation.ensemble.planning import absolute
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario

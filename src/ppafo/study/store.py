@@ -32,7 +32,7 @@ from ppafo.errors import DataError, StudyError, refused_as
 from ppafo.metrics import METRICS
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.recording import CHANNELS
-from ppafo.simulation.ensemble.columns import absolute
+from ppafo.simulation.ensemble.planning import absolute
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import scenario_document
 from ppafo.storage.files import LEFT_ASIDE, is_address, write_file

@@ -17,8 +17,7 @@ from ppafo.parameters.declared import kind_at, value_at
 from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.overrides import read_overrides
 from ppafo.plugins import Plugins, name_plugins
-from ppafo.simulation.assumptions import assumed_lines
-from ppafo.simulation.building import origin_of, read_gas_model, read_supply_line, with_settings
+from ppafo.simulation.building import assumed_lines, origin_of, read_gas_model, read_supply_line, with_settings
 from ppafo.simulation.clock import read_period
 from ppafo.simulation.contradictions import check_contradictions
 from ppafo.simulation.declaration import SUPPLY_LINE

@@ -19,8 +19,7 @@ from ppafo.parameters.actuator_table import (
     within_resolution,
 )
 from ppafo.parameters.loading import load_device, load_parameter_set, parameter_set_toml, parse_parameter_set
-from ppafo.simulation.ensemble.columns import check_columns
-from ppafo.simulation.ensemble.planning import screen_columns
+from ppafo.simulation.ensemble.planning import check_columns, screen_columns
 from ppafo.simulation.loading import load_scenario
 
 EXAMPLE = Path(__file__).parents[2] / "actuators"

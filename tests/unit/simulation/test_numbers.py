@@ -12,8 +12,7 @@ from ppafo.parameters import load_device
 from ppafo.parameters.device import Orifice, SonicOrifice
 from ppafo.parameters.overrides import over
 from ppafo.simulation.clock import TIMES
-from ppafo.simulation.ensemble.columns import check_columns
-from ppafo.simulation.ensemble.planning import screen_columns
+from ppafo.simulation.ensemble.planning import check_columns, screen_columns
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.numbers import check_parts, declared_numbers, number_at, other_form, with_numbers
 from ppafo.simulation.torque_loop import LoopLink

@@ -9,8 +9,7 @@ import ppafo
 from ppafo.errors import PpafoError, ScenarioError
 from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.ensemble import run_ensemble
-from ppafo.simulation.ensemble.columns import check_columns
-from ppafo.simulation.ensemble.planning import plan_ensemble
+from ppafo.simulation.ensemble.planning import check_columns, plan_ensemble
 from ppafo.simulation.scenario import Scenario
 from tests.actuators.soft import OF_SECOND_CHAMBER as SECOND_CHAMBER
 from tests.actuators.soft import soft

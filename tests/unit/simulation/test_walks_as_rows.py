@@ -8,8 +8,7 @@ import pytest
 from ppafo.engine.run import batch_of
 from ppafo.loading import reloaded
 from ppafo.simulation.ensemble import run_ensemble
-from ppafo.simulation.ensemble.columns import check_columns
-from ppafo.simulation.ensemble.planning import plan_ensemble
+from ppafo.simulation.ensemble.planning import check_columns, plan_ensemble
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk

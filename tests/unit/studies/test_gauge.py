@@ -10,7 +10,7 @@ import pytest
 
 import ppafo
 from ppafo.errors import StudyError
-from ppafo.simulation.ensemble.columns import check_columns
+from ppafo.simulation.ensemble.planning import check_columns
 from ppafo.studies.draws import uncertainty_of
 from ppafo.studies.loading import load_study
 from ppafo.studies.study import Study

@@ -15,8 +15,7 @@ from ppafo.model.controlled import CONTROLLED
 from ppafo.progress import report_nothing
 from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.check import MARGIN, finer
-from ppafo.simulation.ensemble.columns import check_columns
-from ppafo.simulation.ensemble.planning import plan_ensemble
+from ppafo.simulation.ensemble.planning import check_columns, plan_ensemble
 from ppafo.simulation.ensemble.running import MeteredRuns, OutputRequest, intervals, offered
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import REMEDY

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 from ppafo.engine.lanes import Batch
 from ppafo.engine.run import batch_of
 from ppafo.errors import PpafoError
-from ppafo.simulation.ensemble.columns import check_columns
-from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
+from ppafo.simulation.ensemble.planning import EnsemblePlan, check_columns, plan_ensemble
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.plan import plan_run
