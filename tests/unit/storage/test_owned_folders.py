@@ -179,7 +179,7 @@ def test_earlier_result_and_new_one_change_places_in_one_step(tmp_path: Path, mo
     def never(self: Path, target: Path) -> Path:
         raise AssertionError(f"{self} is renamed to {target}: a kill now would leave no result in its place")
 
-    monkeypatch.setattr(files, "_try_renaming", print)
+    monkeypatch.setattr("ppafo.storage.owned_folder.check_folder_can_be_replaced", print)
     monkeypatch.setattr(Path, "rename", never)
     again = {CLAIMS: b'{"claims": [1]}', "report.html": b"new"}
     write_reproduction(tmp_path / "out", again)
