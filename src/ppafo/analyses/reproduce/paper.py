@@ -32,7 +32,7 @@ from ppafo.rig import record
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.declaration import OF_A_VANE, quantities
-from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.loading import load_scenario, request_again
 from ppafo.simulation.overrides import deciding_kinds, is_of_device, override_document, unknown_value
 from ppafo.simulation.scenario import Initial, PrescribedMotion, Scenario
 from ppafo.simulation.simulate import Result, simulate
@@ -223,7 +223,9 @@ def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
     kinds = [path for path in by_path if path.endswith(".kind")]
     for path in sorted(by_path, key=lambda path: (path not in kinds, path.count("."), path)):
         documents = {
-            name: override_document(load_scenario(name).origin.content, earlier, name).document
+            name: override_document(
+                replace(request_again(load_scenario(name).origin), overrides=tuple(earlier))
+            ).document
             for name, earlier in applied.items()
         }
         known = {name: OF_A_VANE.paths(document) for name, document in documents.items()}
@@ -253,10 +255,10 @@ def _used_by(assumed: Mapping[AssumedValue, Sequence[str]], *experiments: str) -
 def _assumed_in(scenario: Scenario) -> Iterator[AssumedValue]:
     """Yield the assumed values of a scenario: those that it states, then those of its parameter set in force."""
     origin = scenario.origin
-    changed = override_document(origin.content, read_overrides(origin.overrides), scenario.name)
+    assert origin.parameters is not None, "read from a file"
+    changed, in_force = override_document(request_again(origin)), with_followers(origin.parameters)
     written = read_overrides(origin.content["device"].get("overrides", ()))
     file_set = with_overrides(load_parameter_set(origin.parameter_set), written, origin.valve)
-    in_force = with_followers(with_overrides(file_set, changed.device, origin.valve))
     declared = {**quantities(changed.document), **in_force.declarations()}
     for stated in scenario.assumptions:
         meaning = declared[stated.path].summary if stated.path in declared else ""
