@@ -91,5 +91,5 @@ def test_the_right_model_is_no_misfit_where_its_step_lies_inside_the_recording(f
 
 def test_the_right_model_has_no_delay_where_its_step_lies_inside_the_recording(folder: Path) -> None:
     (agreement,) = validate("ppafo2011", [folder / "there.csv"], overrides=THERE).found.recordings
-    assert agreement.delay.value == pytest.approx(0.0, abs=1.5e-4)
+    assert agreement.delay == pytest.approx(0.0, abs=1.5e-4)
     assert max(channel.fraction for channel in agreement.channels) < 0.005
