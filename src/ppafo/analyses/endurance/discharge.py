@@ -58,10 +58,8 @@ WALK_FILE = "walk.json"
 """Name of the file in a result folder that describes a walk."""
 PEAK_WINDOW = 0.1
 """Averaging window [s] for the largest flow of a recording; lines and regulator smooth shorter peaks."""
-_BETWEEN_RESTS, _SHORTEST = 600.0, 1.0
-"""Default walking time between two rests, and shortest walking and simulated time [s]."""
-MAXIMUM_INTERVALS, _MOST_GAS = 2000, 1.0e3
-"""Largest number of walking and resting intervals, which are integrated one by one, and gas of a stride [kg]."""
+_MOST_GAS = 1.0e3
+"""Largest gas of a stride [kg]."""
 _MOST_RETURNED = 0.1
 """Largest fraction of the gas that may flow back; it stays in the line upstream of the valve for the next stride."""
 TIME_IS_UP = "time is up"
@@ -193,7 +191,24 @@ def discharge(
     walked = sum(interval.end - interval.start for interval in intervals if interval.draw > 0.0)
     mass, needed = float(values[0]), smallest_mass_when_warm(bottle, peak_flow)
     usable, change, wall = max(0.0, mass - needed), (values - start).tolist(), bottle.wall
-    ending, message = _end(bottle, peak_flow, content_of(bottle, values), mass, usable, reason)
+    remaining = f"{mass * GRAMS_PER_KILOGRAM:.3g} g are left"
+    warm = f"{usable * GRAMS_PER_KILOGRAM:.3g} g of this would be usable at room temperature"
+    pressure_margin, flow_margin = reserves(bottle, peak_flow, content_of(bottle, values))
+    # Both are fractions, so that the smaller one says what went short first.
+    is_pressure = pressure_margin <= flow_margin
+    short = "maintain the supply pressure" if is_pressure else "drive the largest flow through the regulator"
+    why = f"its pressure is too low to {short}"
+    if reason == "time":
+        ending = TIME_IS_UP
+        message = f"the supply pressure was maintained for the whole requested time; {remaining}"
+    elif reason == "frozen":
+        cold = "the liquid begins to freeze (dry ice)" if has_liquid(bottle.fluid.table) else "the gas is too cold"
+        ending, message = "frozen", f"{cold}, and the property table ends here; {remaining}, {warm}"
+    # The gas of a warm bottle decides between the two: cold is mended by waiting, empty is not.
+    elif usable > _NEXT_TO_NOTHING * bottle.mass:
+        ending, message = "too cold", f"the bottle is too cold: {why}; {remaining}, {warm}"
+    else:
+        ending, message = "empty", f"the bottle is empty: {why}, even at room temperature; {remaining}"
     return Endurance(
         bottle=bottle,
         schedule=schedule,
@@ -248,32 +263,6 @@ def smallest_mass_when_warm(bottle: Bottle, peak_flow: float, enough: float = ma
         else:
             high = middle
     return high
-
-
-def _end(
-    bottle: Bottle, peak_flow: float, content: BottleContent, mass: float, usable: float, stopped_by: _Stop
-) -> tuple[str, str]:
-    """Return reason and explanation of an end: loss of supply pressure, cold end of the property table, or time limit.
-
-    After a loss of pressure, the bottle is "too cold" if it could still deliver at room temperature, and "empty"
-    otherwise.
-    """
-    remaining = f"{mass * GRAMS_PER_KILOGRAM:.3g} g are left"
-    warm = f"{usable * GRAMS_PER_KILOGRAM:.3g} g of this would be usable at room temperature"
-    if stopped_by == "time":
-        return TIME_IS_UP, f"the supply pressure was maintained for the whole requested time; {remaining}"
-    if stopped_by == "frozen":
-        cold = "the liquid begins to freeze (dry ice)" if has_liquid(bottle.fluid.table) else "the gas is too cold"
-        return "frozen", f"{cold}, and the property table ends here; {remaining}, {warm}"
-    pressure_margin, flow_margin = reserves(bottle, peak_flow, content)
-    # Both are fractions, so that the smaller one says what went short first.
-    is_pressure = pressure_margin <= flow_margin
-    short = "maintain the supply pressure" if is_pressure else "drive the largest flow through the regulator"
-    why = f"its pressure is too low to {short}"
-    # The gas of a warm bottle decides between the two: cold is mended by waiting, empty is not.
-    if usable > _NEXT_TO_NOTHING * bottle.mass:
-        return "too cold", f"the bottle is too cold: {why}; {remaining}, {warm}"
-    return "empty", f"the bottle is empty: {why}, even at room temperature; {remaining}"
 
 
 def _recording(bottle: Bottle, intervals: Sequence[_Interval]) -> Recording:
@@ -343,19 +332,6 @@ def _solve_interval(
 
 
 # Gas use of a walk and of a recording, and the report.
-
-
-def schedule_of(walk: float | None, rest: float | None, longest: float) -> Schedule:
-    """Return times of walking and rest; raises ParameterError for those that cannot be simulated."""
-    if walk is not None and rest is None:
-        raise ParameterError(f"{argument_text('walk')}: also give {argument_text('rest')}, the time of each rest")
-    schedule = Schedule(_BETWEEN_RESTS if walk is None else walk, rest or 0.0, longest)
-    most = 0.5 * MAXIMUM_INTERVALS * (schedule.walk + schedule.rest) if rest else math.inf
-    for name, value, largest in (("walk", schedule.walk, math.inf), ("longest", longest, most)):
-        if not _SHORTEST <= value <= largest:
-            limits = f"at least {_SHORTEST:g} s" + f", at most {largest:g} s with such rests" * (value > largest)
-            raise ParameterError(f"{argument_text(name)} = {value:g} s: must be {limits}")
-    return schedule
 
 
 def gas_of_walk(walk: WalkResult | Path) -> tuple[Scenario, Recording, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -25,6 +26,10 @@ GasUses = Annotated[
 ]
 _STRIDE_TIME = 1.1
 """Default stride time [s]."""
+_BETWEEN_RESTS, _SHORTEST = 600.0, 1.0
+"""Default walking time between two rests, and shortest walking and simulated time [s]."""
+MAXIMUM_INTERVALS = 2000
+"""Largest number of walking and resting intervals, which are integrated one by one."""
 
 
 @checked
@@ -80,23 +85,29 @@ def bottle(
         finding_of,
         of_recording,
         on_walk,
-        schedule_of,
     )
     from ppafo.arguments.reading import units_given
     from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
     from ppafo.parameters.overrides import read_overrides
     from ppafo.signals import Recording
     from ppafo.walking import WalkResult
+    from ppafo.walking.bottle.coupling import Schedule
 
     uses = (recordings,) if isinstance(recordings, str | Path | Recording | WalkResult) else tuple(recordings)
     if bool(uses) == (gas_per_stride is not None):
         example = argument_text("gas_per_stride", "0.3 g")
         raise ParameterError(f"give either a recording or {argument_text('gas_per_stride')}, for example {example}")
-    schedule, changes = schedule_of(walk, rest, longest), tuple(overrides)
-    chosen = PAPER_BOTTLE if bottle is None else bottle
-    for override in read_overrides(changes):
-        if "gas" in override.typed.split("."):
-            raise ParameterError(f"override '{override}': the gas is that of the bottle; choose another bottle")
+    if walk is not None and rest is None:
+        raise ParameterError(f"{argument_text('walk')}: also give {argument_text('rest')}, the time of each rest")
+    schedule = Schedule(_BETWEEN_RESTS if walk is None else walk, rest or 0.0, longest)
+    most = 0.5 * MAXIMUM_INTERVALS * (schedule.walk + schedule.rest) if rest else math.inf
+    for name, value, largest in (("walk", schedule.walk, math.inf), ("longest", longest, most)):
+        if not _SHORTEST <= value <= largest:
+            limits = f"at least {_SHORTEST:g} s" + f", at most {largest:g} s with such rests" * (value > largest)
+            raise ParameterError(f"{argument_text(name)} = {value:g} s: must be {limits}")
+    changes, chosen = tuple(overrides), PAPER_BOTTLE if bottle is None else bottle
+    for override in (each for each in read_overrides(changes) if "gas" in each.typed.split(".")):
+        raise ParameterError(f"override '{override}': the gas is that of the bottle; choose another bottle")
     if gas_per_stride is not None:
         time, units = _STRIDE_TIME if stride_time is None else stride_time, units_given({"kg/s": peak_flow})
         if time <= 0.0:
