@@ -99,7 +99,8 @@ def varied_path(
     quantity, texts = known[path], list(texts)
     number, given = next((split_quantity(str(text)) for text in texts if unit_in(text)), (0.0, ""))
     is_plain = number == 0.0 or _SMALLEST_SHOWN <= abs(number) < _LARGEST_SHOWN
-    units = [split_quantity(text)[1] for text in texts if isinstance(text, str)]
+    # A text that cannot be read is refused with its key, where it is converted.
+    units = [unit for text in texts if (unit := unit_in(text))]
     gauge = [bool(gauge_link(path, 0.0, unit)) for unit in units]
     is_gauge = atmosphere_varies and quantity.unit == "Pa_a" and any(gauge)
     if is_gauge and not all(gauge):

@@ -14,15 +14,13 @@ LEAK = AREA | {"path": "actuator.leak.area"}
 CD = {"path": "valve.discharge_coefficient", "kind": "uniform", "minimum": 0.1, "maximum": 0.2}
 CONTRADICTIONS = [
     ({"kind": "uniform", "minimum": "12 mm^2", "maximum": "10 mm^2"}, "minimum = '12 mm^2' must be less than maximum"),
-    (
-        {"kind": "log_uniform", "minimum": "0 mm^2", "maximum": "10 mm^2"},
-        "must be above 0",
-    ),
+    ({"kind": "log_uniform", "minimum": "0 mm^2", "maximum": "10 mm^2"}, "must be above 0"),
     (
         {"kind": "uniform", "minimum": "-1 mm^2", "maximum": "1 mm^2"},
         "minimum = '-1 mm^2': valve.area must be at least",
     ),
-    ({"kind": "uniform", "minimum": "1 mm", "maximum": "2 mm^2"}, "a unit like 'm^2' is needed"),
+    ({"kind": "uniform", "minimum": "1 mm", "maximum": "2 mm^2"}, "minimum = '1 mm': unit 'mm' does not fit"),
+    ({"kind": "uniform", "minimum": "1 mm^2", "maximum": "wide"}, "maximum = 'wide': 'wide' does not start with a"),
     ({"kind": "normal", "mean": "10 mm^2", "standard_deviation": "-1 mm^2"}, "standard_deviation = '-1 mm^2' must be"),
     ({"kind": "triangular", "minimum": "1 mm^2", "mode": "9 mm^2", "maximum": "3 mm^2"}, "mode = '9 mm^2' must lie"),
     ({"kind": "choice", "values": ["1 mm^2", "2 mm^2"], "weights": [1.0]}, "weights has 1 numbers, values has 2"),
