@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from ppafo.analyses import ask
 from ppafo.arguments import Word, checked
+from ppafo.documents.json_text import fields_of, plain
 from ppafo.identification.estimate import Estimate, Identified
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report, report_nothing
@@ -21,11 +23,9 @@ if TYPE_CHECKING:
     from ppafo.identification.problem import ProblemFile
     from ppafo.identification.trajectory.fitting import NuisanceParameter, TrajectoryFit
     from ppafo.parameters.parameter_set import ParameterSet
-    from ppafo.report.finding import Finding, Section
-    from ppafo.report.panels import Panel
+    from ppafo.report.finding import Finding
     from ppafo.signals import Recording, RecordingKind
 
-Problem = Annotated[str | Path, Word("PROBLEM", Path)]
 _FAR = 2.0
 """Number of standard deviations above which a tolerance counts as contradicted by the recordings."""
 _FAR_FROM_SET = 5.0
@@ -99,8 +99,6 @@ class Identification:
 
     def json_document(self) -> dict[str, Any]:
         """Return estimates, checks and the new set as plain data in SI; rows of matrices follow the estimates."""
-        from ppafo.documents.json_text import fields_of, plain
-
         parts = [
             {
                 **fields_of(part, "procedure", "summary", "conflict"),
@@ -154,7 +152,7 @@ class Identification:
 
 @checked
 def identify(
-    problem: Problem,
+    problem: Annotated[str | Path, Word("PROBLEM", Path)],
     *,
     plugins: Plugins = (),
     progress: Report = report_nothing,
@@ -277,28 +275,27 @@ def finding_of(identification: Identification) -> Finding[Identification]:
     """Return an identification as a finding; passed if the recordings agree and the new set is valid and consistent."""
     from ppafo.identification.bench.law import bench_figure
     from ppafo.parameters.loading import parameter_set_toml
-    from ppafo.report.finding import Finding, Section
 
     name, new_set, before = identification.name, identification.new_set, identification.before
-    parts, figures, counts = list[Section](), list[Section](), dict[str, int]()
+    parts, figures, counts = list[ask.Section](), list[ask.Section](), dict[str, int]()
     for result in identification.results:
         parts.append(_part(result, before))
         number = counts[result.procedure] = counts.get(result.procedure, 0) + 1
         stem = result.procedure if number == 1 else f"{result.procedure}-{number}"
         draw = partial(bench_figure, result.panels, result.kind)
-        figures.append(Section(name=stem, caption=result.summary, is_detail=True, draw=draw))
+        figures.append(ask.Section(name=stem, caption=result.summary, is_detail=True, draw=draw))
     if (fit := identification.trajectory) is not None:
         more = [
             f"next experiment {number}: {item.label}: gain {item.gain:.2f}; largest for {item.most_helped}, whose "
             f"interval would shrink by {1.0 - item.shrinkage[item.most_helped]:.0%}"
             for number, item in enumerate(fit.expected, start=1)
         ]
-        parts.append(_part(fit, before, _tolerances(fit.known, before), more))
+        parts.append(_part(fit, before, fit.known, more))
         for measured, model in zip(fit.measurements, fit.models, strict=True):
             panels, shape = partial(trajectory_panels, measured, model), (measured.label, (5.4, 1.9))
             stem, caption = f"trajectory-fit-{measured.label}", f"{measured.label} and the fit."
             figures.append(
-                Section(name=stem, caption=caption, is_detail=True, panels=panels, title=shape[0], size=shape[1])
+                ask.Section(name=stem, caption=caption, is_detail=True, panels=panels, title=shape[0], size=shape[1])
             )
     written, fitted = new_set.written, new_set.fitted
     # A value that holds for this model only is in the set as well, and is never counted as identified.
@@ -315,12 +312,12 @@ def finding_of(identification: Identification) -> Finding[Identification]:
         )
     # As they are remarks among others, these that prevent a pass are repeated at the end.
     problem += [f"not passed (exit code 1): {fault}" for part in identification.parts for fault in part.faults]
-    return Finding(
+    return ask.Finding(
         name="identify",
         kicker="Identification",
         title=f"The parameter set {name}",
         said=(),
-        parts=(*parts, Section(said=(f"new set '{name}': {count}{fitted_text}", *problem)), *figures),
+        parts=(*parts, ask.Section(said=(f"new set '{name}': {count}{fitted_text}", *problem)), *figures),
         found=identification,
         passed=identification.is_good,
         kind=identification.kind,
@@ -329,12 +326,16 @@ def finding_of(identification: Identification) -> Finding[Identification]:
     )
 
 
-def _part(part: Identified, before: ParameterSet, tolerances: Iterable[str] = (), more: Iterable[str] = ()) -> Section:
-    """Return the section of a procedure or of the fit: its estimates in the units of the set, and its remarks."""
-    from ppafo.identification.estimate import interval_texts
+def _part(
+    part: Identified, before: ParameterSet, known: Iterable[NuisanceParameter] = (), more: Iterable[str] = ()
+) -> ask.Section:
+    """Return the section of a procedure or of the fit: its estimates in the units of the set, and its remarks.
+
+    Of the tolerances ``known`` those are said that widen an interval most, and those that contradict the recordings.
+    """
+    from ppafo.identification.estimate import NAMED, digits_of, interval_texts
     from ppafo.identification.new_set import in_set_unit
     from ppafo.parameters.parameter_set import entry_text, number_in_si
-    from ppafo.report.finding import Section, columns_of
 
     rows, far = list[tuple[str, ...]](), list[str]()
     said = [f"holds for this model only: {part.conflict}"] if part.conflict else []
@@ -346,60 +347,51 @@ def _part(part: Identified, before: ParameterSet, tolerances: Iterable[str] = ()
         shown = f"{text} {numbers[0][1]}".removesuffix(" -").rstrip()
         rows.append((item.path, shown, " to ".join(ends), item.verdict_text))
         # A value far from that of the set is right for another device, or a wrong unit; openings have none.
-        entry, known = before.numbers.get(item.path), number_in_si(before, item.path) or 0.0
-        if entry is None or not item.is_usable or ".opening." in item.path or not (known > 0.0 and item.value > 0.0):
+        entry, usual = before.numbers.get(item.path), number_in_si(before, item.path) or 0.0
+        if entry is None or not item.is_usable or ".opening." in item.path or not (usual > 0.0 and item.value > 0.0):
             continue
-        if not 1.0 / _FAR_FROM_SET < (ratio := item.value / known) < _FAR_FROM_SET:
+        if not 1.0 / _FAR_FROM_SET < (ratio := item.value / usual) < _FAR_FROM_SET:
             far.append(f"remark: {item.path} is {ratio:.3g} times the value of the set, {entry_text(entry)}")
-    origin = "" if part.kind == "measured" else f" ({part.kind})"
-    remarks = [*said, *far, *tolerances, *(f"remark: {remark}" for remark in part.remarks), *more]
-    return Section(f"{part.procedure}{origin}: {part.summary}", columns_of(("",) * 4, rows), remarks=remarks)
-
-
-def _tolerances(known: Sequence[NuisanceParameter], before: ParameterSet) -> list[str]:
-    """Return sentences on the tolerances that widen an interval most, and on those that contradict the recordings."""
-    from ppafo.identification.estimate import NAMED, digits_of
-    from ppafo.identification.new_set import in_set_unit
-
-    rows = []
+    tolerances = []
     by_share = sorted(known, key=lambda number: (-float(f"{number.share:.2g}"), number.name))
-    for place, item in enumerate(by_share):
-        if place >= NAMED and not abs(item.after - item.before) > _FAR * item.before_error:
+    for place, number in enumerate(by_share):
+        if place >= NAMED and not abs(number.after - number.before) > _FAR * number.before_error:
             continue
         # With its own error, as stated and as fitted.
         texts = []
-        for value, error in ((item.before, item.before_error), (item.after, item.after_error)):
+        for value, error in ((number.before, number.before_error), (number.after, number.after_error)):
             # A unit with an offset, such as degC, has none in a difference.
             (level, unit), (upper, _), (zero, _) = (
-                in_set_unit(number, item.name.partition(" of ")[0], item.unit, before) for number in (value, error, 0.0)
+                in_set_unit(each, number.name.partition(" of ")[0], number.unit, before) for each in (value, error, 0.0)
             )
             width = upper - zero
             texts.append(f"{digits_of(level, width)} +- {digits_of(width, width)} {unit}".rstrip(" -"))
-        entry = before.numbers.get(item.name)
+        entry = before.numbers.get(number.name)
         default = " (the set states none)" if entry is not None and not entry.uncertainty else ""
-        share = f"; {percentage(item.share, 2)} of the variance of {item.widens}" if item.widens else ""
-        rows.append(f"tolerance: {item.name}: prior {texts[0]}{default}, fitted {texts[1]}{share}")
-    return rows
+        share = f"; {percentage(number.share, 2)} of the variance of {number.widens}" if number.widens else ""
+        tolerances.append(f"tolerance: {number.name}: prior {texts[0]}{default}, fitted {texts[1]}{share}")
+    origin = "" if part.kind == "measured" else f" ({part.kind})"
+    remarks = [*said, *far, *tolerances, *(f"remark: {remark}" for remark in part.remarks), *more]
+    return ask.Section(f"{part.procedure}{origin}: {part.summary}", ask.columns_of(("",) * 4, rows), remarks=remarks)
 
 
-def trajectory_panels(measurement: Recording, model: Recording) -> list[Panel]:
+def trajectory_panels(measurement: Recording, model: Recording) -> list[ask.Panel]:
     """Return samples, model at the same times and residuals of one experiment: two panels for each fitted channel."""
-    from ppafo.report.kind import TIME, Kind
     from ppafo.report.residuals import FittedCurve, course_panels
     from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
 
     origins = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
-    panels: list[Panel] = []
+    panels: list[ask.Panel] = []
     for name, kind, style, change in (
-        ("angle", Kind("Vane angle", "rad", "angle"), ACTUAL, "angle"),
-        ("pressure_1", Kind("Pressure in chamber 1", "Pa_a", "pressure"), CHAMBER_1, "pressure change"),
-        ("pressure_2", Kind("Pressure in chamber 2", "Pa_a", "pressure"), CHAMBER_2, "pressure change"),
+        ("angle", ask.Kind("Vane angle", "rad", "angle"), ACTUAL, "angle"),
+        ("pressure_1", ask.Kind("Pressure in chamber 1", "Pa_a", "pressure"), CHAMBER_1, "pressure change"),
+        ("pressure_2", ask.Kind("Pressure in chamber 2", "Pa_a", "pressure"), CHAMBER_2, "pressure change"),
     ):
         if name in measurement:
             curve = FittedCurve(
-                time=TIME,
+                time=ask.TIME,
                 level=kind,
-                change=Kind("Residual (measured - model)", quantity=change),
+                change=ask.Kind("Residual (measured - model)", quantity=change),
                 times=measurement.time,
                 samples=measurement[name],
                 model=model[name],

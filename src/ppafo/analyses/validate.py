@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from ppafo.analyses import ask, np
 from ppafo.arguments import Duration, Name, Overrides, Volume, Word, checked
 from ppafo.documents.json_text import fields_of
 from ppafo.errors import DataError
@@ -23,9 +24,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
     from ppafo.parameters.device import Device
-    from ppafo.report.finding import Finding, Section
-    from ppafo.report.kind import Kind
-    from ppafo.report.panels import Panel
+    from ppafo.report.finding import Finding
     from ppafo.signals import Recording
     from ppafo.storage.column_map import ColumnMap
     from ppafo.validation.agreement import ChannelAgreement, RecordingAgreement
@@ -33,12 +32,6 @@ if TYPE_CHECKING:
     from ppafo.validation.measured import MeasuredRecording
     from ppafo.validation.settings import ReplaySettings
 
-SetLike = Annotated[str | Path, Word("PARAMETERS")]
-ColumnsLike = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
-Recorded = Annotated["Recording | DataFrame | Dataset | str | Path", Word("RECORDING")]
-Motion = Annotated[str, Word("free|measured|locked|leg")]
-Initial = Annotated[str, Word("CHANNEL=VALUE")]
-Limits = Annotated[Sequence[str], Word("[CHANNEL=]LIMIT", option="--threshold")]
 KIND_WORDS = {"measured": "measured", "synthetic": "synthetic measurement", "simulated": "simulated, not measured"}
 """Words of the report for the origin of a recording, so that model output does not pass for a measurement."""
 _OF_START = 3.0
@@ -51,10 +44,6 @@ _SHORT = 3.0
 """Duration [s] below which the time axis is in milliseconds."""
 _HEAD = ("channel", "RMS error", "in noise", "variation", "of range", "limit", "bias", "largest", "at", "verdict")
 """Column heads of the table of errors."""
-_UNUSUAL = re.compile(r"[^A-Za-z0-9_.-]+")
-"""Pattern of characters that are replaced in file names."""
-_WRITTEN_AS_ZERO = 5.0e-4
-"""Absolute value below which a number in the table of errors is written as 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +70,8 @@ class Validation:
 
     def json_document(self) -> dict[str, Any]:
         """Return errors, causes and recordings as plain data in SI."""
+        from ppafo.validation.settings import COMPARED
+
         return {
             "format": "ppafo agreement",
             "schema_version": 1,
@@ -120,7 +111,11 @@ class Validation:
                             **fields_of(channel, "variation", "bias", "largest", "largest_time"),
                             "rms_share": channel.fraction,
                             "limit_share": channel.limit,
-                            "shown": {"unit": (kind := _kind_of(channel)).shown_unit, "rms": kind.shown(channel.rms)},
+                            "shown": {
+                                # A difference of values, as of two pressures.
+                                "unit": (kind := ask.Kind("", "", COMPARED[channel.channel].quantity)).shown_unit,
+                                "rms": kind.shown(channel.rms),
+                            },
                         }
                         for channel in agreement.channels
                     },
@@ -131,27 +126,19 @@ class Validation:
         }
 
 
-def _kind_of(channel: ChannelAgreement) -> Kind:
-    """Return display unit and number format of the errors of a channel, which are differences."""
-    from ppafo.report.kind import Kind
-    from ppafo.validation.settings import COMPARED
-
-    return Kind("", "", COMPARED[channel.channel].quantity)
-
-
 @checked
 def validate(
-    parameter_set: SetLike,
-    recordings: Sequence[Recorded],
+    parameter_set: Annotated[str | Path, Word("PARAMETERS")],
+    recordings: Sequence[Annotated[Recording | DataFrame | Dataset | str | Path, Word("RECORDING")]],
     *,
     valve: Name | None = None,
     overrides: Overrides = (),
-    motion: Motion = "free",
+    motion: Annotated[str, Word("free|measured|locked|leg")] = "free",
     volume: Volume | None = None,
-    initial: Sequence[Initial] = (),
-    thresholds: Limits = (),
+    initial: Sequence[Annotated[str, Word("CHANNEL=VALUE")]] = (),
+    thresholds: Annotated[Sequence[str], Word("[CHANNEL=]LIMIT", option="--threshold")] = (),
     longest_delay: Duration = 0.02,
-    columns: ColumnsLike | None = None,
+    columns: Annotated[ColumnMap | str | Path, Word("FILE.toml[:NAME]")] | None = None,
     plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[Validation]:
@@ -245,14 +232,31 @@ def verdict(validation: Validation) -> str:
         texts = [f"{worst.channel} is off by {_times(worst.in_noise)} times its noise ({share})"]
         if not passes and causes.found is None and any(row.request.settings.motion == "free" for row in recordings):
             texts.append("the vane was taken to be free")
-        texts.append(_why(causes, worst.in_noise, passes))
+        if causes.found is not None:
+            # An error beyond a limit is more than usual, of whatever kind it is.
+            said = f"{causes.found.in_words}{', as on any bench' if causes.found.is_usual and passes else ''}"
+            same = ", ".join(cause.name for cause in causes.found.same)
+            texts.append(f"{said} (indistinguishable with these recordings: {same})" if same else said)
+        elif causes.tried or causes.kinds:
+            second = ", for a second one is seen beside the nearest" if causes.has_second else ""
+            texts.append(f"no single change explains the residual{second}")
+            # Named if it at least halves the error, leaves noise, or is of wrong samples, found whatever else is wrong.
+            near = causes.nearest
+            if near is not None and (
+                causes.has_second or near.is_of_samples or near.left <= _EXPLAINS * worst.in_noise
+            ):
+                left = [
+                    f"{each.in_words}, which leaves {_times(each.left)} times the noise" for each in (near, *near.same)
+                ]
+                texts.append(f"nearest: {', or '.join(left)}")
+            texts += [f"tried: {causes.kinds}"] if causes.kinds else []
     # Said if it is longer than usual of sensors: a valve may be late as well.
     if (removed := max(agreement.delay for agreement in recordings)) > PRESSURE_ERRORS.delay:
         said = f"a delay of {1.0e3 * removed:.3g} ms was removed"
         if (delay := validation.device.valve.settings.get("delay")) is not None:
             said += f", of the sensors or of the valve (valve.delay = {1.0e3 * (delay + removed):.3g} ms)"
         texts.append(said)
-    explanation, name = "; ".join(filter(None, texts)), validation.device.name
+    explanation, name = "; ".join(texts), validation.device.name
     if not passes:
         failed = ", ".join(
             f"{channel.channel} in {agreement.file} ({percentage(channel.fraction, 3)}, limit "
@@ -268,30 +272,6 @@ def verdict(validation: Validation) -> str:
     return f"{agreed}; {explanation}"
 
 
-def _why(causes: Diagnosis, without: float, passes: bool) -> str:
-    """Return the cause of a residual in words, or the nearest cause; empty if none was searched.
-
-    ``without`` is the largest error divided by noise [-] without any cause. A nearest cause is named if it at least
-    halves this error, if it leaves noise, or if it concerns wrong samples, detectable whatever else is wrong.
-    """
-    if causes.found is not None:
-        # An error beyond a limit is more than usual, of whatever kind it is.
-        said = f"{causes.found.in_words}{', as on any bench' if causes.found.is_usual and passes else ''}"
-        same = ", ".join(cause.name for cause in causes.found.same)
-        return f"{said} (indistinguishable with these recordings: {same})" if same else said
-    if not (causes.tried or causes.kinds):
-        return ""
-    said, nearest = "no single change explains the residual", causes.nearest
-    if causes.has_second:
-        said += ", for a second one is seen beside the nearest"
-    if nearest is not None and (causes.has_second or nearest.is_of_samples or nearest.left <= _EXPLAINS * without):
-        texts = [
-            f"{cause.in_words}, which leaves {_times(cause.left)} times the noise" for cause in (nearest, *nearest.same)
-        ]
-        said += f"; nearest: {', or '.join(texts)}"
-    return f"{said}{f'; tried: {causes.kinds}' if causes.kinds else ''}"
-
-
 def _times(size: float) -> str:
     """Return a multiple of the noise as text with two digits and without a power of ten."""
     return f"{size:.2g}" if size < 100.0 else f"{size:.0f}"
@@ -300,11 +280,13 @@ def _times(size: float) -> str:
 @in_units(lambda validation: validation.device.shown)
 def _finding_of(validation: Validation) -> Finding[Validation]:
     """Return a validation as a finding; passed if every error is within its limit."""
-    from ppafo.report.finding import Finding, Section, facts
     from ppafo.storage.comma_separated import marked_csv_bytes
 
     # Stems of the written files, numbered if recordings have one name.
-    stems = [_UNUSUAL.sub("-", Path(row.file).stem).strip("-.") or "recording" for row in validation.recordings]
+    stems = [
+        re.sub(r"[^\w.-]+", "-", Path(row.file).stem, flags=re.ASCII).strip("-.") or "recording"
+        for row in validation.recordings
+    ]
     names = [
         f"{stem}-{1 + stems[:index].count(stem)}" if stems.count(stem) > 1 else stem for index, stem in enumerate(stems)
     ]
@@ -324,15 +306,15 @@ def _finding_of(validation: Validation) -> Finding[Validation]:
     )
     read = [agreement.request.measured for _, agreement in pairs]
     hashes = [(measured.file, f"sha256 {measured.sha256}") for measured in read if measured.sha256]
-    return Finding(
+    return ask.Finding(
         name="validate",
         kicker="Validation of a parameter set",
         title=f"{validation.device.name} against {count_of(len(validation.recordings), 'recording')}",
         said=said,
         parts=(
-            Section(said=[method], is_detail=True),
+            ask.Section(said=[method], is_detail=True),
             *(_part(name, agreement) for name, agreement in pairs),
-            Section("Files" if hashes else "", facts(hashes), is_detail=True),
+            ask.Section("Files" if hashes else "", ask.columns_of(("", ""), hashes), is_detail=True),
         ),
         found=validation,
         passed=validation.passes,
@@ -345,15 +327,15 @@ def _finding_of(validation: Validation) -> Finding[Validation]:
     )
 
 
-def _part(name: str, agreement: RecordingAgreement) -> Section:
+def _part(name: str, agreement: RecordingAgreement) -> ask.Section:
     """Return the section of one recording: table of errors, and panels. ``name`` is the stem of its files."""
-    from ppafo.report.finding import Section, columns_of
+    from ppafo.validation.settings import COMPARED
 
     def number(value: float) -> str:
-        return "0" if abs(value) < _WRITTEN_AS_ZERO else f"{value:.3g}"
+        return "0" if abs(value) < 5.0e-4 else f"{value:.3g}"
 
     def cells(channel: ChannelAgreement) -> tuple[str, ...]:
-        kind = _kind_of(channel)
+        kind = ask.Kind("", "", COMPARED[channel.channel].quantity)
         rms, variation, bias, largest = (
             f"{number(kind.shown(value))} {kind.shown_unit}"
             for value in (channel.rms, channel.variation, channel.bias, channel.largest)
@@ -369,9 +351,9 @@ def _part(name: str, agreement: RecordingAgreement) -> Section:
         f"{', '.join(agreement.replayed.inputs)}; delay of the measurement: {delay}"
     )
     across = 1 if len(agreement.channels) == 1 else 2
-    return Section(
+    return ask.Section(
         f"{agreement.file} ({kind})",
-        columns_of(_HEAD, map(cells, agreement.channels)),
+        ask.columns_of(_HEAD, map(cells, agreement.channels)),
         [replayed],
         remarks=[f"note: {remark}" for remark in agreement.remarks],
         panels=partial(_panels, agreement, across),
@@ -383,26 +365,22 @@ def _part(name: str, agreement: RecordingAgreement) -> Section:
     )
 
 
-def _panels(agreement: RecordingAgreement, across: int) -> list[Panel]:
+def _panels(agreement: RecordingAgreement, across: int) -> list[ask.Panel]:
     """Return the panels of a recording in rows of ``across`` channels: samples with the model, and residuals below."""
-    import numpy as np
-
-    from ppafo.report.kind import TIME, Kind
-    from ppafo.report.panels import Panel
     from ppafo.report.residuals import FittedCurve, course_panels
     from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
     from ppafo.validation.settings import COMPARED, PRESSURE_1, PRESSURE_2
 
     measured, looks = agreement.measured, {PRESSURE_1: CHAMBER_1, PRESSURE_2: CHAMBER_2}
-    time, scale = (Kind("Time", "ms"), 1.0e3) if measured.duration < _SHORT else (TIME, 1.0)
-    pairs: list[list[Panel]] = []
+    time, scale = (ask.Kind("Time", "ms"), 1.0e3) if measured.duration < _SHORT else (ask.TIME, 1.0)
+    pairs: list[list[ask.Panel]] = []
     for index, channel in enumerate(agreement.channels):
         name, quantity = channel.channel, COMPARED[channel.channel]
         limit = channel.limit * channel.full_range
         curve = FittedCurve(
             time=time,
-            level=Kind(quantity.title, "", "pressure" if name in looks else quantity.quantity),
-            change=Kind(f"Measured - model, RMS {percentage(channel.fraction, 2)}", "", quantity.quantity),
+            level=ask.Kind(quantity.title, "", "pressure" if name in looks else quantity.quantity),
+            change=ask.Kind(f"Measured - model, RMS {percentage(channel.fraction, 2)}", "", quantity.quantity),
             times=scale * measured.time,
             samples=channel.values,
             model=channel.model,
@@ -412,6 +390,6 @@ def _panels(agreement: RecordingAgreement, across: int) -> list[Panel]:
         is_near = float(np.abs(channel.residuals).max()) >= _NEAR_LIMIT * limit
         pairs.append(course_panels(curve, "dots", "" if index else "figure", (-limit, limit) if is_near else ()))
     # An odd number of channels leaves one place in the last row empty.
-    pairs += [[Panel(TIME, TIME, ()), Panel(TIME, TIME, (), tall=0.5)]] * (-len(pairs) % across)
+    pairs += [[ask.Panel(ask.TIME, ask.TIME, ()), ask.Panel(ask.TIME, ask.TIME, (), tall=0.5)]] * (-len(pairs) % across)
     rows = [pairs[first : first + across] for first in range(0, len(pairs), across)]
     return [panel for row in rows for level in zip(*row, strict=True) for panel in level]

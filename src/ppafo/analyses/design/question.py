@@ -15,12 +15,10 @@ if TYPE_CHECKING:
     from ppafo.analyses.design.search import Sizing
     from ppafo.report.finding import Finding
 
-DesignLike = Annotated["SizingProblem | str | Path", Word("DESIGN")]
-
 
 @checked
 def design(
-    problem: DesignLike,
+    problem: Annotated[SizingProblem | str | Path, Word("DESIGN")],
     *,
     profile: Annotated[str | Path, Word("PROFILE")] | None = None,
     threads: Threads | None = None,

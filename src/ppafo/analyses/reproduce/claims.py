@@ -14,7 +14,6 @@ from ppafo.documents.json_text import fields_of
 from ppafo.errors import ScenarioError, SimulationError, UnitError, refused_as
 from ppafo.parameters import load_device
 from ppafo.parameters.publications.publication import FILE, PAPER, ClaimEntry, PublicationFile, read_publication
-from ppafo.progress import Progress, Report
 from ppafo.report.writing import quantity
 from ppafo.units import from_si, parse_quantity
 from ppafo.version import __version__
@@ -38,13 +37,8 @@ VERDICTS: dict[Verdict, tuple[str, str]] = {
 """Symbol and meaning of each verdict; only the first two follow from reported numbers alone."""
 ALL = "all"
 """Name of all studies together."""
-DEVICE = "ppafo2011"
-MINUTES = 0.5
-"""Duration of a walk [min]; without noise the strides repeat, so that longer walks give the same result."""
 WALK = "solenoid"
 """Name of the walk with direct event control."""
-KEEPS_GAIT = "wearer.keeps_gait=1"
-"""Override of a walk for a nondisabled wearer, whose muscles keep the measured ankle angle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,20 +157,6 @@ def list_studies() -> list[dict[str, Any]]:
     return [{"name": name, "title": words[name]} for name in study_names()]
 
 
-def run_studies(study: str, of_paper: Sequence[Claim], report: Report) -> Studies:
-    """Return a publication with verdicts, or all publications after the claims ``of_paper``.
-
-    Raises ScenarioError for an invalid file, SimulationError if a walk fails.
-    """
-    judged = list(of_paper)
-    for name in study_names()[1:-1] if study == ALL else (study,):
-        claims = load_publication(name)
-        for number, claim in enumerate(claims):
-            report(Progress(f"{claim.study}: {claim.entry.id}", number, len(claims), noun="claims"))
-            judged.append(judge(claim))
-    return Studies(ALL if study == ALL else judged[0].study, tuple(judged))
-
-
 def judge(claim: Claim) -> Claim:
     """Compute our value for a claim and judge it; SimulationError if a walk fails."""
     entry = claim.entry
@@ -197,52 +177,53 @@ def load_publication(name_or_path: str | Path) -> tuple[Claim, ...]:
     Raises ScenarioError for an invalid file.
     """
     publication, file = read_publication(name_or_path)
-    return tuple(_checked(entry, publication, f"{file}: claims.{entry.id}") for entry in publication.claims)
-
-
-def _checked(entry: ClaimEntry, publication: PublicationFile, where: str) -> Claim:
-    """Return a claim whose computation, range, unit and arguments fit each other; ``where`` is its place."""
-    claim = Claim(entry, note=entry.note or entry.not_testable, assumptions=entry.assumed, publication=publication)
-    if bool(entry.computation) == bool(entry.not_testable):
-        raise ScenarioError(f"{where}: give either computation, or not_testable with the reason")
-    if entry.not_testable:
-        return claim
-    if entry.computation not in COMPUTATIONS:
-        known = known_names(entry.computation, COMPUTATIONS)
-        raise ScenarioError(f"{where}.computation: '{entry.computation}' is unknown{known}")
-    (low, high), stated = claim.limits, entry.published
-    if low == -math.inf and high == math.inf:
-        raise ScenarioError(f"{where}: give at_least, at_most or both, the range in which the claim holds")
-    if low > high:
-        raise ScenarioError(f"{where}: at_least = {low:g} must not exceed at_most = {high:g}")
-    # A published number lies in its own range: else the range was typed wrongly.
-    if stated is not None and not low <= stated <= high:
-        limit = f"at_least = {low:g}" if stated < low else f"at_most = {high:g}"
-        raise ScenarioError(f"{where}: published = {stated:g} is outside {limit}; widen the range")
-    _, unit, takes = COMPUTATIONS[entry.computation]
-    with refused_as(ScenarioError, f"{where}.unit", UnitError):
-        # Only for what it raises: here the place in the file is known.
-        from_si(1.0, entry.unit, unit)
-    if entry.arguments.keys() != takes.keys():
-        given, known = ", ".join(entry.arguments) or "none", ", ".join(takes) or "none"
-        hints = "".join(nearest_name(name, takes) for name in entry.arguments if name not in takes)
-        raise ScenarioError(f"{where}.arguments: {entry.computation} takes {known}; given: {given}{hints}")
-    values = dict[str, float]()
-    for name, unit in takes.items():
-        key, text = f"{where}.arguments.{name}", entry.arguments[name]
-        with refused_as(ScenarioError, key, UnitError):
-            values[name] = parse_quantity(text, unit)
-        # An absolute pressure does not lie below 0.
-        if not 0.0 <= values[name] < math.inf:
-            raise ScenarioError(f"{key} = '{text}': must be finite and at least 0 {unit}")
-    return replace(claim, arguments=values)
+    claims = []
+    for entry in publication.claims:
+        where = f"{file}: claims.{entry.id}"
+        claim = Claim(entry, note=entry.note or entry.not_testable, assumptions=entry.assumed, publication=publication)
+        if bool(entry.computation) == bool(entry.not_testable):
+            raise ScenarioError(f"{where}: give either computation, or not_testable with the reason")
+        if entry.not_testable:
+            claims.append(claim)
+            continue
+        if entry.computation not in COMPUTATIONS:
+            known = known_names(entry.computation, COMPUTATIONS)
+            raise ScenarioError(f"{where}.computation: '{entry.computation}' is unknown{known}")
+        (low, high), stated = claim.limits, entry.published
+        if low == -math.inf and high == math.inf:
+            raise ScenarioError(f"{where}: give at_least, at_most or both, the range in which the claim holds")
+        if low > high:
+            raise ScenarioError(f"{where}: at_least = {low:g} must not exceed at_most = {high:g}")
+        # A published number lies in its own range: else the range was typed wrongly.
+        if stated is not None and not low <= stated <= high:
+            limit = f"at_least = {low:g}" if stated < low else f"at_most = {high:g}"
+            raise ScenarioError(f"{where}: published = {stated:g} is outside {limit}; widen the range")
+        _, unit, takes = COMPUTATIONS[entry.computation]
+        with refused_as(ScenarioError, f"{where}.unit", UnitError):
+            # Only for what it raises: here the place in the file is known.
+            from_si(1.0, entry.unit, unit)
+        if entry.arguments.keys() != takes.keys():
+            given, known = ", ".join(entry.arguments) or "none", ", ".join(takes) or "none"
+            hints = "".join(nearest_name(name, takes) for name in entry.arguments if name not in takes)
+            raise ScenarioError(f"{where}.arguments: {entry.computation} takes {known}; given: {given}{hints}")
+        values = dict[str, float]()
+        for name, unit in takes.items():
+            key, text = f"{where}.arguments.{name}", entry.arguments[name]
+            with refused_as(ScenarioError, key, UnitError):
+                values[name] = parse_quantity(text, unit)
+            # An absolute pressure does not lie below 0.
+            if not 0.0 <= values[name] < math.inf:
+                raise ScenarioError(f"{key} = '{text}': must be finite and at least 0 {unit}")
+        claims.append(replace(claim, arguments=values))
+    return tuple(claims)
 
 
 # Several claims rest on one walk, which takes seconds.
 @lru_cache(maxsize=16)
 def _walked(*overrides: str) -> WalkResult:
     """Run the shipped walk with overrides; SimulationError if it does not reach its end."""
-    result = walk(load_walk(WALK, overrides), minutes=MINUTES)
+    # Without noise the strides repeat, so that longer walks give the same result.
+    result = walk(load_walk(WALK, overrides), minutes=0.5)
     if not result.status.is_completed:
         raise SimulationError(f"walk '{WALK}' must be complete for a claim: {result.status.message}")
     return result
@@ -250,7 +231,7 @@ def _walked(*overrides: str) -> WalkResult:
 
 def held_torque(pressure: float) -> float:
     """Static torque [N m] at a supply pressure [Pa absolute]: torque constant times gauge pressure. Equation (2)."""
-    return load_device(DEVICE).actuator.torque_constant * (pressure - STANDARD_ATMOSPHERE)
+    return load_device("ppafo2011").actuator.torque_constant * (pressure - STANDARD_ATMOSPHERE)
 
 
 def share_of_healthy_moment(pressure: float) -> float:
@@ -269,7 +250,8 @@ def walking_torque(pressure: float) -> float:
 
 def dorsiflexor_share() -> float:
     """Dorsiflexor moment of a nondisabled wearer with the device divided by the moment without [-], stride means."""
-    worn, name = _walked(KEEPS_GAIT), "dorsiflexor_moment"
+    # The muscles of a nondisabled wearer keep the measured ankle angle.
+    worn, name = _walked("wearer.keeps_gait=1"), "dorsiflexor_moment"
     return worn.metrics[name].value / healthy_metrics(worn.scenario)[name].value
 
 

@@ -81,8 +81,6 @@ READINGS_OF_U = (("the opening, -1 to 1", 1.0), ("volts, 5 open the valve", 5.0)
 """Interpretations of U of equation (13), each with the U that opens the proportional valve fully."""
 WITHIN_REACH = 4.0
 """Reference level [N m] within the reach of the supply."""
-_GAINS = ("proportional_gain", "integral_gain", "derivative_gain")
-_RESTS_ON = ("the torque task as completed here",)
 
 
 class AssumedValue(NamedTuple):
@@ -101,11 +99,6 @@ class AssumedValue(NamedTuple):
     reason: str
     source: str
 
-    def sentence(self) -> str:
-        """Format the assumed value and its reason as one line."""
-        source = f" ({self.source})" if self.source else ""
-        return f"{self.path} = {self.value}: {self.reason}{source}"
-
 
 class InterpretationOfU(NamedTuple):
     """Interpretation of U, with the advantage of the proportional valve over the solenoid pair.
@@ -121,7 +114,7 @@ class InterpretationOfU(NamedTuple):
 
 
 class SyntheticEvidence(NamedTuple):
-    """Synthetic recordings: both procedures of figure 3, the step response, and both torque tasks."""
+    """Synthetic recordings: both procedures of figure 3 (the paper's values), step response, and both torque tasks."""
 
     torque: BenchResult
     decay: BenchResult
@@ -180,7 +173,19 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
             raise SimulationError(f"simulation of scenario '{name}' failed: {runs[-1].status.message}")
     step, solenoid, proportional = runs
     report(Progress("measuring on the simulated test bench (synthetic)"))
-    synthetic = _synthetic_evidence({name: scenario.origin.overrides for name, scenario in scenarios.items()})
+    synthetic: SyntheticEvidence | str
+    changes = {name: scenario.origin.overrides for name, scenario in scenarios.items()}
+    try:
+        recorded = [
+            record("torque-task", TASK_PRESET, RIG_SEED, PLANTED_SET, changes[name], valve).recording
+            for name, valve in ((SOLENOID, "solenoid"), (PROPORTIONAL, "proportional"))
+        ]
+        results = _bench_figure()
+        started = record("step-response", BENCH_PRESET, RIG_SEED, PLANTED_SET, changes[STEP]).recording
+        synthetic = SyntheticEvidence(*results, started, *recorded)
+    # No claim rests on a recording: without them the figures show less, and the report says why.
+    except (SimulationError, DataError) as error:
+        synthetic = str(error)
     report(Progress("checking the paper's own numbers"))
     assumed: dict[AssumedValue, list[str]] = {}
     for name, scenario in scenarios.items():
@@ -249,7 +254,8 @@ def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
 
 def _used_by(assumed: Mapping[AssumedValue, Sequence[str]], *experiments: str) -> tuple[str, ...]:
     """Return the assumptions beyond the paper that the named experiments use, a sentence for each."""
-    return tuple(value.sentence() for value, users in assumed.items() if not set(experiments).isdisjoint(users))
+    used = (value for value, users in assumed.items() if not set(experiments).isdisjoint(users))
+    return tuple(f"{path} = {value}: {why}{source and f' ({source})'}" for path, _, value, _, why, source in used)
 
 
 def _assumed_in(scenario: Scenario) -> Iterator[AssumedValue]:
@@ -275,27 +281,6 @@ def _assumed_in(scenario: Scenario) -> Iterator[AssumedValue]:
             # A number set for this run says which one it replaces.
             reason, source = (f"set for this run; {entry.note}", "") if is_set_here else (entry.note, entry.source)
             yield AssumedValue(path, declared[path].summary, entry_text(entry), entry.origin, reason, source)
-
-
-# Synthetic recordings.
-
-
-def _synthetic_evidence(changes: Mapping[str, Sequence[str]]) -> SyntheticEvidence | str:
-    """Return the recordings of the rig, or an error message if a run fails or the rig does not support the overrides.
-
-    ``changes`` are the overrides of each experiment. The procedures of figure 3 always use the paper's values.
-    """
-    try:
-        solenoid, proportional = (
-            record("torque-task", TASK_PRESET, RIG_SEED, PLANTED_SET, changes[name], valve).recording
-            for name, valve in ((SOLENOID, "solenoid"), (PROPORTIONAL, "proportional"))
-        )
-        torque, decay = _bench_figure()
-        step = record("step-response", BENCH_PRESET, RIG_SEED, PLANTED_SET, changes[STEP]).recording
-    # No claim rests on a recording: without them the figures show less, and the report says why.
-    except (SimulationError, DataError) as error:
-        return str(error)
-    return SyntheticEvidence(torque, decay, step, solenoid, proportional)
 
 
 @cache
@@ -568,6 +553,7 @@ def torque_task_claims(
     gas = GRAMS_PER_KILOGRAM * proportional.metrics["gas_supplied"].value
     over = f"Median and range of {pair_errors.size} runs over the unknown phase of the decisions, either valve first."
     every = "The controller decides every millisecond, so the phase does not matter."
+    follows = "Follows from the two amounts of gas and is not independent evidence."
     # Where the pair makes no error, or takes no gas, there is nothing to save from.
     with np.errstate(divide="ignore", invalid="ignore"):
         better, saved = 100.0 * (1.0 - error / pair_errors), 100.0 * (1.0 - gas / pair_gas)
@@ -576,12 +562,7 @@ def torque_task_claims(
         _claim_over_phases("torque_rms_improvement", better, over, rests_on),
         _claim_over_phases("co2_solenoid", pair_gas, over, rests_on, 1),
         _claim_over_phases("co2_proportional", np.array([gas]), every, rests_on, 2),
-        _claim_over_phases(
-            "co2_saving",
-            saved,
-            f"{over} Follows from the two amounts of gas and is not independent evidence.",
-            rests_on,
-        ),
+        _claim_over_phases("co2_saving", saved, f"{over} {follows}", rests_on),
     ]
 
 
@@ -608,7 +589,7 @@ def _control_claims(solenoid: Result, proportional: Result, pair_errors: Floats)
     Runs with the settings of each are compared with the experiments; ``pair_errors`` are the RMS errors [N m] of the
     solenoid pair over the unknown phase of its decisions.
     """
-    claims, faster = [], "limited_by_switching"
+    claims, faster, rests_on = [], "limited_by_switching", ("the torque task as completed here",)
     runs = {faster: solenoid, "gains_minimise_error": proportional, "dead_zone_amplifies_delay": solenoid}
     for identifier, run in runs.items():
         entry, own = paper_entries()[identifier], run.scenario.origin.overrides
@@ -622,13 +603,13 @@ def _control_claims(solenoid: Result, proportional: Result, pair_errors: Floats)
             continue
         if identifier == faster:
             less, words = 100.0 * (1.0 - changed / pair_errors), "% less error at 100 Hz"
-            claims.append(_claim_over_phases(faster, less, entry.note, _RESTS_ON, words=words))
+            claims.append(_claim_over_phases(faster, less, entry.note, rests_on, words=words))
             continue
         error = run.metrics["rms_error"].value
         value = 100.0 * (changed / error - 1.0)
         found = f"{abs(value):.0f} % {'more' if value > 0.0 else 'less'} error"
         note = f"{entry.note} In this task {changed:.3f} instead of {error:.3f} N m."
-        claims.append(Claim(entry, "undetermined", value, note, _RESTS_ON, found))
+        claims.append(Claim(entry, "undetermined", value, note, rests_on, found))
     beyond = paper_entries()["beyond_improved_control"]
     return [*claims, Claim(beyond, "undetermined", note=beyond.not_testable)]
 
@@ -650,9 +631,10 @@ def readings_of_u(solenoid: Result, proportional: Result) -> tuple[Interpretatio
     readings, against = [], both(pair)
     for name, full in READINGS_OF_U:
         # Volts times a gain for volts give the same opening.
-        gains = {gain: spool.controller.settings[gain] / full for gain in _GAINS}
-        read = replace(spool, controller=replace(spool.controller, settings={**spool.controller.settings, **gains}))
-        less = (100.0 * (1.0 - own / other) for own, other in zip(both(read), against, strict=True))
+        own, gains = spool.controller.settings, ("proportional_gain", "integral_gain", "derivative_gain")
+        settings = {**own, **{gain: own[gain] / full for gain in gains}}
+        read = replace(spool, controller=replace(spool.controller, settings=settings))
+        less = (100.0 * (1.0 - value / other) for value, other in zip(both(read), against, strict=True))
         readings.append(InterpretationOfU(name, *less))
     return tuple(readings)
 

@@ -14,12 +14,10 @@ if TYPE_CHECKING:
     from ppafo.analyses.reproduce.paper import Reproduction
     from ppafo.report.finding import Finding
 
-PublicationName = Annotated[str | Path, Word("NAME", option="--study")]
-
 
 @checked
 def reproduce(
-    study: PublicationName = "ppafo-2011",
+    study: Annotated[str | Path, Word("NAME", option="--study")] = "ppafo-2011",
     *,
     overrides: Overrides = (),
     plugins: Plugins = (),
@@ -49,7 +47,7 @@ def reproduce(
     report = progress or report_nothing
     # Loading takes a second or two.
     report(Progress("loading the experiments"))
-    from ppafo.analyses.reproduce.claims import ALL, run_studies, study_names
+    from ppafo.analyses.reproduce.claims import ALL, Studies, judge, load_publication, study_names
     from ppafo.analyses.reproduce.paper import reproduce_paper
     from ppafo.analyses.reproduce.report import finding_of, finding_of_studies
     from ppafo.documents.toml_text import label
@@ -67,5 +65,10 @@ def reproduce(
         raise ScenarioError(f"{option} {changes[0]}: applies to the study '{PAPER}' only; omit {option} or {argument}")
     if name == PAPER:
         return finding_of(reproduce_paper(changes, report))
-    paper = reproduce_paper((), report).claims if name == ALL else ()
-    return finding_of_studies(run_studies(name, paper, report))
+    judged = list(reproduce_paper((), report).claims) if name == ALL else []
+    for each in study_names()[1:-1] if name == ALL else (name,):
+        claims = load_publication(each)
+        for number, claim in enumerate(claims):
+            report(Progress(f"{claim.study}: {claim.entry.id}", number, len(claims), noun="claims"))
+            judged.append(judge(claim))
+    return finding_of_studies(Studies(ALL if name == ALL else judged[0].study, tuple(judged)))

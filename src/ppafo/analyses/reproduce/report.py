@@ -331,29 +331,24 @@ def _torque_task_panels(reproduction: Reproduction) -> list[Panel]:
     opening = Mark("line", proportional.time, proportional["command"], colour=style.PROPORTIONAL.colour)
     opening_limits = limits(ylim=(-0.08 if proportional["command"].min() >= 0.0 else -1.1, 1.08))
     gas_limits = limits(ylim=(0.0, 1.1 * max(most, *in_paper.values())))
+    filling = []
+    for row, side, look in ((1, 1.0, style.CHAMBER_1), (0, -1.0, style.CHAMBER_2)):
+        is_on = np.sign(solenoid["command"]) == side
+        # A command holds until the next sample, so that a bar reaches to the first sample at which the valve is off.
+        filled = {"where": is_on | np.concatenate(([False], is_on[:-1])), "alpha": 1.0}
+        edges = np.full((2, is_on.size), [[row + 0.12], [row + 0.88]])
+        filling.append(Mark("band", solenoid.time, edges, colour=look.colour, style=filled))
     panel = partial(Panel, TIME, shares_x=True)
     command_panel = partial(panel, Kind(), legend="", tall=0.7)
     return [
         panel(_TORQUE, torques[0], "Torque with solenoid valves, on or off", tall=2.3, then=torque_limits),
-        command_panel(_filling_marks(solenoid), "Chamber that the solenoid valves fill", then=chambers),
+        command_panel(filling, "Chamber that the solenoid valves fill", then=chambers),
         panel(_TORQUE, torques[1], "Torque with the proportional valve", tall=2.3, then=torque_limits),
         command_panel([opening], "Opening of the proportional valve", then=opening_limits),
         panel(_ERROR, errors, "Error: reference less torque, both valves", legend="", tall=1.3, then=limits()),
         panel(_GAS, gas, "CO$_2$ from the supply (dotted: the paper)", tall=1.3, then=gas_limits),
         _gas_panel(solenoid, proportional, most),
     ]
-
-
-def _filling_marks(recording: Recording) -> list[Mark]:
-    """Return bars for the times at which each of the two valves is on, in the colour of its chamber."""
-    marks = []
-    for row, valve, look in ((1, 1.0, style.CHAMBER_1), (0, -1.0, style.CHAMBER_2)):
-        is_on = np.sign(recording["command"]) == valve
-        # A command holds until the next sample, so that a bar reaches to the first sample at which the valve is off.
-        filled = {"where": is_on | np.concatenate(([False], is_on[:-1])), "alpha": 1.0}
-        edges = np.full((2, is_on.size), [[row + 0.12], [row + 0.88]])
-        marks.append(Mark("band", recording.time, edges, colour=look.colour, style=filled))
-    return marks
 
 
 def _gas_panel(solenoid: Recording, proportional: Recording, most: float) -> Panel:

@@ -19,9 +19,6 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.report.finding import Finding, Section, columns_of
 from ppafo.wording import argument_text, count_of
 
-_WIDTH = 100
-_INDENT = "    "
-_SEVERITIES = ("error", "warning", "note")
 _wrapped = partial(textwrap.wrap, width=110)
 _SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow", "effects", "valves", "reported")
 _COLUMNS = ("path", "value", "unit", "origin", "source")
@@ -42,14 +39,12 @@ def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
         "values": [{"path": path, **asdict(entry)} for path, entry in entries],
         "accepted": dict(parameter_set.accepted),
     }
-    notes, citation = document["notes"], document["citation"]
     cited = ""
-    if citation is not None:
-        authors = f"{', '.join(citation['authors'])}: " if citation["authors"] else ""
-        year = f" ({citation['year']})" if citation["year"] else ""
-        doi = f" doi:{citation['doi']}" if citation["doi"] else ""
-        cited = f"{authors}{citation['title']}{year}.{doi} {citation['note']}".strip()
-    rows = []
+    if stated is not None:
+        authors = f"{', '.join(stated.authors)}: " if stated.authors else ""
+        year, doi = f" ({stated.year})" if stated.year else "", f" doi:{stated.doi}" if stated.doi else ""
+        cited = f"{authors}{stated.title}{year}.{doi} {stated.note}".strip()
+    rows, remarks = list[tuple[str, ...]](), list[str]()
     for value in document["values"]:
         number = value["value"]
         # A flag is a number to Python: it is tested first.
@@ -58,30 +53,24 @@ def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
         if value.get("uncertainty") is not None:
             written += f" +- {value['uncertainty']:.3g}"
         rows.append((value["path"], written, value.get("unit", ""), value["origin"], value["source"]))
-    joint = document["joint"]
-    valves = ", ".join(f"{name} ({kind})" for name, kind in document["valves"].items())
+        remarks += _wrapped(f"{value['path']}: {value['note']}") if value["note"] else []
+    joint = parameter_set.joint
+    valves = ", ".join(f"{name} ({kind})" for name, kind in parameter_set.valve_kinds.items())
+    parts = (
+        cited,
+        f"valves: {valves}; default {parameter_set.default_valve}; actuator: {parameter_set.actuator_kind}",
+        f"joint: {joint.name}, whose angle grows in {joint.positive}, falls in {joint.negative}",
+    )
+    accepted = [f"accepted: {name}: {why}" for name, why in parameter_set.accepted.items()]
     return Finding(
-        name=document["name"],
+        name=parameter_set.name,
         kicker="Parameter set",
-        title=document["title"],
-        said=[f"{document['name']}: {document['title']}", *_wrapped(notes)],
+        title=parameter_set.title,
+        said=[f"{parameter_set.name}: {parameter_set.title}", *_wrapped(document["notes"])],
         parts=[
-            Section(said=_wrapped(cited)),
-            Section(said=[f"valves: {valves}; default {document['default_valve']}; actuator: {document['actuator']}"]),
-            Section(
-                said=[f"joint: {joint['name']}, whose angle grows in {joint['positive']}, falls in {joint['negative']}"]
-            ),
-            Section(
-                columns=columns_of(_COLUMNS, rows),
-                remarks=[
-                    text
-                    for value in document["values"]
-                    if value["note"]
-                    for text in _wrapped(f"{value['path']}: {value['note']}")
-                ],
-                left=len(_COLUMNS),
-            ),
-            *(Section(said=_wrapped(f"accepted: {name}: {why}")) for name, why in document["accepted"].items()),
+            *(Section(said=_wrapped(text)) for text in parts),
+            Section(columns=columns_of(_COLUMNS, rows), remarks=remarks, left=len(_COLUMNS)),
+            *(Section(said=_wrapped(text)) for text in accepted),
         ],
         found=document,
         kind="measured",
@@ -105,7 +94,9 @@ class AuditedSet:
     @property
     def counts(self) -> dict[str, int]:
         """Number of findings of the audit by severity."""
-        return {name: sum(finding.severity == name for finding in self.findings) for name in _SEVERITIES}
+        return {
+            name: sum(finding.severity == name for finding in self.findings) for name in ("error", "warning", "note")
+        }
 
     def json_document(self) -> dict[str, Any]:
         """Return the findings, and the changes against the parent set, as plain data."""
@@ -233,9 +224,9 @@ def _parts(audited_set: AuditedSet, changed: frozenset[str] | None) -> list[Sect
         lines = [f"{finding.severity}: {finding.title} [{finding.id}]"]
         for value in finding.values:
             text = value.value if isinstance(value.value, str) else f"{value.value:.6g} {value.unit}".rstrip()
-            lines.append(f"{_INDENT}{value.path} = {text} ({value.origin})")
+            lines.append(f"    {value.path} = {text} ({value.origin})")
         accepted = [f"Accepted by the set: {finding.accepted}"] if finding.accepted else []
         for paragraph in (finding.paragraph, *accepted):
-            lines += textwrap.wrap(paragraph, _WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT)
+            lines += textwrap.wrap(paragraph, 100, initial_indent="    ", subsequent_indent="    ")
         parts.append(Section(said=lines))
     return [*parts, Section(said=[f"{name}: {summary}"])]

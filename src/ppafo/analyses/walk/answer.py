@@ -2,25 +2,18 @@
 
 import platform
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
-import numpy as np
-
+from ppafo.analyses import ask, np
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.json_text import fields_of, plain
 from ppafo.errors import PpafoError
-from ppafo.loading import reloaded, usage_text
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.reach import torque_reach
-from ppafo.remedy_trials import verdict_of
-from ppafo.report.finding import Column, Finding, Section, columns_of, facts
-from ppafo.report.kind import Kind
-from ppafo.signals.recording import Floats
-from ppafo.simulation.gains import gains_of
-from ppafo.simulation.numbers import changes_in, declared_numbers
+from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.scenario import UNITS, Scenario
-from ppafo.simulation.tracking import Tracking
 from ppafo.simulation.tracking.remedies import remedy
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
@@ -37,16 +30,12 @@ from ppafo.walking.result import WALK_FORMAT, WalkResult, limited_request
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import WalkComparison, walk
 
-_PRESSURE, _TORQUE, _GAS = (Kind(quantity=name, form=".3g") for name in ("pressure", "torque", "gas mass"))
+_PRESSURE, _TORQUE, _GAS = (ask.Kind(quantity=name, form=".3g") for name in ("pressure", "torque", "gas mass"))
 _SHARE, _WARMTH, _BOTTLE_PRESSURE = (
-    Kind(quantity=name, form=".0f") for name in ("fraction", "temperature", "pressure")
+    ask.Kind(quantity=name, form=".0f") for name in ("fraction", "temperature", "pressure")
 )
-_WORK, _PERCENT = Kind("", "J", "energy", ".3g"), Kind("", "1", "fraction", ".2g")
-_ANGLE, _HEIGHT = Kind("", "rad", "angle", ".3g"), Kind("", "m", "length", ".2g")
-_FAR_ABOVE = 2.0
-"""Ratio of absolute chamber pressure to supply pressure for a remark; healthy wearers stay below."""
-SCHEMA_VERSION = 1
-REVERSALS_PER_STRIDE, LARGEST_TORQUE = "reversals_per_stride", "largest_torque"
+_WORK, _PERCENT = ask.Kind("", "J", "energy", ".3g"), ask.Kind("", "1", "fraction", ".2g")
+_ANGLE, _HEIGHT = ask.Kind("", "rad", "angle", ".3g"), ask.Kind("", "m", "length", ".2g")
 _NUMBERS = {
     "body_mass": ("Body mass of the wearer", "mass", 1),
     "gas": ("Gas per stride", "gas mass", 3),
@@ -57,8 +46,8 @@ _NUMBERS = {
     "torque_error": ("RMS torque error while torque is requested", "torque", 2),
     "requested_torque": ("... RMS of the requested torque", "torque", 2),
     "peak_torque": ("Largest torque in either direction", "torque", 1),
-    LARGEST_TORQUE: ("... limit of the controller", "torque", 1),
-    REVERSALS_PER_STRIDE: ("Command reversals per stride", "", 1),
+    "largest_torque": ("... limit of the controller", "torque", 1),
+    "reversals_per_stride": ("Command reversals per stride", "", 1),
     "lowest_toes": ("Lowest toe height above ground in mid-swing", "body length", 1),
     "toe_landing": ("Strides that begin on the toes", "fraction", 0),
     "dorsiflexor_moment": ("Moment of the wearer's dorsiflexors, mean", "torque", 2),
@@ -66,13 +55,12 @@ _NUMBERS = {
     "counted_strides": ("Strides in these means", "", 0),
 }
 """Rows of the table of metrics of a walk: title, kind of quantity and number of decimals by name."""
-WOULD_DRAG = "would drag"
-"""Text in tables for toes that would penetrate the ground."""
 _EXPLAINED = (
     "'Without' is the same wearer without a device: no plate, torque or friction, and the ankle's own range of motion. "
     "'Healthy' is the gait itself. Ground contact in the swing is not simulated: toes below the ground would drag. "
     "The first two strides, in which the controller learns the stride time, and an unfinished last stride are left "
-    "out. The device is on one leg, so a stride is one step of that leg."
+    "out. The device is on one leg, so a stride is one step of that leg. The gait is prescribed: the device moves "
+    "the ankle where the foot is free, and cannot change how the wearer walks."
 )
 _LEGS = (
     "Shank and foot on the path that the gait prescribes. A cross marks toes below the ground in mid-swing: they "
@@ -94,18 +82,10 @@ _BOTTLE_EXPLAINED = (
     "A walk ends when the line behind the regulator does not reach the given fraction of the set pressure within two "
     "strides, or when the fluid in the bottle freezes.",
 )
-_LIMITS = (
-    "The gait is prescribed: the device moves the ankle where the foot is free, and cannot change how the wearer walks."
-)
-
-_LAWS = (("controller.kind=event_proportional",), ("controller.kind=event_proportional", "device.valve=proportional"))
-"""Overrides that are tried for a walk without a controller: the controller alone, and with the valve it needs."""
 _PRESSURES = (1.2, 1.4, 1.7, 2.0, 3.0, 5.0)
 """Factors on the gauge pressures of the supplies that are tried if the toes would drag."""
 _HIGHEST_PRESSURE = 1.0e6
 """Highest gauge pressure [Pa] that is tried: ten bar, the rating of most small pneumatic parts."""
-_STIFFER = (2.0, 4.0)
-"""Factors on the stiffness with which a controller lifts the foot, tried if the requested torque is too small."""
 _NEARLY = 0.95
 """Ratio of a torque to its limit from which the limit counts as reached [-]."""
 _FIRST_TRIAL = 9.0
@@ -113,7 +93,7 @@ _FIRST_TRIAL = 9.0
 
 
 @in_units(lambda comparison: comparison.with_device.scenario.device.shown)
-def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
+def finding_of(comparison: WalkComparison) -> ask.Finding[dict[str, Any]]:
     """Return the comparison of a walk with and without the device as a finding.
 
     A walk that diverged has numbers but no figures, and the report has not passed.
@@ -122,22 +102,22 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
     scenario, motion, law = worn.scenario, walk_of(worn.scenario), law_of(worn.scenario)
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
     ended = f"{scenario.name}: {worn.status.kind}, {strides} of {motion.gait.name}"
-    verdict, gains = verdict_of(worn), gains_of(scenario)
+    verdict, gains = ask.verdict_of(worn), ask.gains_of(scenario)
     cut_off = (walked for walked in (worn, comparison.without_device) if not walked.status.is_completed)
     said = [ended, *(f"{walked.scenario.name}: {walked.status.message}" for walked in cut_off)]
     said += [benefit_sentence(comparison), verdict.sentence, limited_request(scenario)]
     said += [scenario.origin.replaced, "" if gains is None else gains.sentence]
     title = f" ({motion.gait.title})" if motion.gait.title else ""
     set_up = (scenario.description, f"device '{scenario.device.name}', gait '{motion.gait.name}'{title}", law.summary)
-    mended = usage_text(reloaded(scenario, verdict.mended)) if verdict.mended else ""
-    supply, bottle, pictures = worn.supply, list[Section](), list[Section]()
+    mended = ask.usage_text(ask.reloaded(scenario, verdict.mended)) if verdict.mended else ""
+    supply, bottle, pictures = worn.supply, list[ask.Section](), list[ask.Section]()
     remarks = [*person_remarks(scenario)]
     pressures = scenario.device.supply.pressure, scenario.device.supply.dorsiflexion_pressure
     for number, pressure in enumerate(pressures, 1):
         channel = f"pressure_{number}"
         largest = float(worn.recording[channel].max()) if channel in worn.recording else 0.0
-        # The foot compresses the chamber.
-        if largest > _FAR_ABOVE * pressure:
+        # The foot compresses the chamber; with healthy wearers by less.
+        if largest > 2.0 * pressure:
             reached, supplied = map(_PRESSURE.text, (largest, pressure))
             remarks.append(
                 f"the pressure in chamber {number} reaches {reached}, at a supply pressure of {supplied}: "
@@ -145,57 +125,56 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
             )
     if supply:
         bottle = [
-            Section("On the bottle", facts(_bottle_facts(worn, supply))),
-            Section(
+            ask.Section("On the bottle", ask.columns_of(("", ""), _bottle_facts(worn, supply))),
+            ask.Section(
                 "The bottle over the walk",
                 name="bottle",
                 caption=_BOTTLE,
                 draw=partial(bottle_figure, worn),
                 is_detail=True,
             ),
-            Section("How to read the bottle", said=_BOTTLE_EXPLAINED, is_detail=True),
+            ask.Section("How to read the bottle", said=_BOTTLE_EXPLAINED, is_detail=True),
         ]
     # Without a whole stride there is no mean of them.
     if worn.averages and comparison.without_device.averages:
         legs = partial(frames_figure, comparison)
         mean = partial(walk_figure, {"with the device": worn, "without": comparison.without_device})
         pictures = [
-            Section("The leg", name="legs", caption=_LEGS, draw=legs, is_detail=True),
-            Section("The mean stride", name="mean-stride", caption=_MEAN, draw=mean, is_detail=True),
+            ask.Section("The leg", name="legs", caption=_LEGS, draw=legs, is_detail=True),
+            ask.Section("The mean stride", name="mean-stride", caption=_MEAN, draw=mean, is_detail=True),
         ]
     files: dict[str, Callable[[], bytes]] = {"recording.csv": partial(marked_csv_bytes, worn.recording)}
     for result, ending in ((worn, ""), (comparison.without_device, "-off")):
         files[f"recording{ending}.nc"] = partial(netcdf_bytes, result.recording, None)
-        files[f"strides{ending}.csv"] = partial(strides_csv, result)
-        files[f"mean-stride{ending}.csv"] = partial(mean_stride_csv, result)
+        files[f"strides{ending}.csv"] = partial(_strides_csv, result)
+        files[f"mean-stride{ending}.csv"] = partial(_mean_stride_csv, result)
     if supply:
         files["bottle.csv"] = partial(marked_csv_bytes, supply.recording)
     assumed = [(assumption.path, assumption.note) for assumption in scenario.assumptions]
-    return Finding(
+    return ask.Finding(
         name="walk",
         kicker=f"A walk of {float(worn.recording.time[-1]) / 60.0:.3g} min",
         title=f"Walking with {scenario.name}",
         said=[sentence for sentence in said if sentence],
         parts=(
-            Section(said=[sentence for sentence in set_up if sentence], is_detail=True),
-            Section(columns=comparison_table(comparison), remarks=[remark for remark in remarks if remark]),
+            ask.Section(said=[sentence for sentence in set_up if sentence], is_detail=True),
+            ask.Section(columns=comparison_table(comparison), remarks=[remark for remark in remarks if remark]),
             *bottle,
-            Section("Command with the remedy" if mended else "", code=mended),
-            Section("How to read it", said=(_EXPLAINED, _LIMITS), is_detail=True),
+            ask.Section("Command with the remedy" if mended else "", code=mended),
+            ask.Section("How to read it", said=(_EXPLAINED,), is_detail=True),
             *pictures,
-            Section("Assumptions" if assumed else "", columns_of(("value", "why"), assumed), left=2, is_detail=True),
+            ask.Section(
+                "Assumptions" if assumed else "", ask.columns_of(("value", "why"), assumed), left=2, is_detail=True
+            ),
         ),
         found=_walk_data(comparison, verdict),
         passed=comparison.is_completed,
         files=files,
-        overrides=changes_in(scenario),
+        overrides=ask.changes_in(scenario),
     )
 
 
 # Benefit of the device against the same walk without it, and a remedy if it does not help.
-
-RemedyTrials = tuple[str, Sequence[tuple[str, ...]], str]
-"""Cause of missing help, the overrides of each remedy to try in turn, and advice if no remedy suffices."""
 
 
 def benefit_sentence(comparison: WalkComparison) -> str:
@@ -209,9 +188,20 @@ def benefit_sentence(comparison: WalkComparison) -> str:
         return ""
     has_work = numbers["net_push_off_work"] > 0.0
     drags, drags_without = (metrics.get("lowest_toes", 0.0) < 0.0 for metrics in (numbers, without))
-    both = numbers.keys() & without.keys()
-    is_closer = "angle_difference" in both and without["angle_difference"] > numbers["angle_difference"]
-    lifts = not drags and (drags_without or is_closer)
+    clauses, lifts = (
+        [f"{_WORK.text(numbers['net_push_off_work'])} of net work in push-off"],
+        drags_without and not drags,
+    )
+    if "push_off_share" in numbers:
+        clauses[0] += f" (positive work {_PERCENT.text(numbers['push_off_share'])} of the healthy ankle's)"
+    if "angle_difference" in numbers and "angle_difference" in without:
+        angle, angle_without = (metrics["angle_difference"] for metrics in (numbers, without))
+        lifts |= not drags and angle < angle_without
+        clauses.append(f"ankle {_ANGLE.text(angle)} from the healthy one ({_ANGLE.text(angle_without)} without)")
+    if "lowest_toes" in numbers:
+        height = "toes would drag" if drags else f"toes {_HEIGHT.text(numbers['lowest_toes'])} over the ground"
+        height_without = "also" if drags == drags_without else "would drag" if drags_without else "clear"
+        clauses.append(f"{height} ({height_without} without)")
     if not (has_work or lifts):
         verdict = "the device does not help"
     elif drags:
@@ -220,25 +210,8 @@ def benefit_sentence(comparison: WalkComparison) -> str:
         verdict = "the device helps" if has_work else "the device helps in swing alone"
     if not worn.status.is_completed:
         verdict = f"until then {verdict}"
-    clauses = ", ".join(_compared(numbers, without))
     remedied = _remedied(worn, drags) if drags or not has_work else []
-    return "; ".join([f"{verdict}, against the same walk without it: {clauses}", *remedied])
-
-
-def _compared(numbers: Mapping[str, float], without: Mapping[str, float]) -> list[str]:
-    """Return clauses on work, ankle and toes, from the metrics [SI] of the walks with the device and without it."""
-    clauses = [f"{_WORK.text(numbers['net_push_off_work'])} of net work in push-off"]
-    if "push_off_share" in numbers:
-        clauses[0] += f" (positive work {_PERCENT.text(numbers['push_off_share'])} of the healthy ankle's)"
-    if "angle_difference" in numbers and "angle_difference" in without:
-        angle, angle_without = (_ANGLE.text(metrics["angle_difference"]) for metrics in (numbers, without))
-        clauses.append(f"ankle {angle} from the healthy one ({angle_without} without)")
-    if "lowest_toes" in numbers:
-        drags, drags_without = numbers["lowest_toes"] < 0.0, without.get("lowest_toes", 0.0) < 0.0
-        height = "toes would drag" if drags else f"toes {_HEIGHT.text(numbers['lowest_toes'])} over the ground"
-        height_without = "also" if drags == drags_without else "would drag" if drags_without else "clear"
-        clauses.append(f"{height} ({height_without} without)")
-    return clauses
+    return "; ".join([f"{verdict}, against the same walk without it: {', '.join(clauses)}", *remedied])
 
 
 def _remedied(worn: WalkResult, drags: bool) -> list[str]:
@@ -251,38 +224,35 @@ def _remedied(worn: WalkResult, drags: bool) -> list[str]:
         return []
     (cause, remedies, advice), whole = _trials(worn, drags), worn.scenario.run.duration
     for overrides in remedies:
-        gain = ""
-        # Toes may sink from stride to stride: the whole walk decides.
-        for seconds in (_FIRST_TRIAL, whole) if whole > _FIRST_TRIAL else (whole,):
-            gain = _gain(worn, overrides, seconds, drags)
-            if not gain:
-                break
-        if gain:
-            changes = " and ".join(f"`{text.replace('=', ' = ', 1)}`" for text in overrides)
-            minutes = f"{whole / 60.0:.3g} min"
-            return [f"{cause}: for example with {changes}, {gain}, simulated in another walk of {minutes}"]
+        with suppress(PpafoError):
+            # Toes may sink from stride to stride: the whole walk decides.
+            for seconds in (_FIRST_TRIAL, whole) if whole > _FIRST_TRIAL else (whole,):
+                again = walk(with_duration(ask.reloaded(worn.scenario, overrides), seconds))
+                if not again.status.is_completed:
+                    break
+                toes, work = (again.metrics[name].value for name in ("lowest_toes", "net_push_off_work"))
+                if work <= 0.0 or (drags and toes < 0.0):
+                    break
+            else:
+                changes = " and ".join(f"`{text.replace('=', ' = ', 1)}`" for text in overrides)
+                gain = f"toes {_HEIGHT.text(toes)} over the ground and {_WORK.text(work)}"
+                minutes = f"{whole / 60.0:.3g} min"
+                return [f"{cause}: for example with {changes}, {gain}, simulated in another walk of {minutes}"]
     return [f"{cause}, and {advice}"] if advice else []
 
 
-def _gain(worn: WalkResult, overrides: Sequence[str], seconds: float, drags: bool) -> str:
-    """Return height of the toes and work of a walk with a remedy as text; "" if not enough."""
-    try:
-        again = walk(with_duration(reloaded(worn.scenario, overrides), seconds))
-    except PpafoError:
-        return ""
-    if not again.status.is_completed:
-        return ""
-    toes, work = (again.metrics[name].value for name in ("lowest_toes", "net_push_off_work"))
-    is_enough = work > 0.0 and not (drags and toes < 0.0)
-    return f"toes {_HEIGHT.text(toes)} over the ground and {_WORK.text(work)}" if is_enough else ""
+def _trials(worn: WalkResult, drags: bool) -> tuple[str, Sequence[tuple[str, ...]], str]:
+    """Return the cause of missing help, the overrides of each remedy to try in turn, and advice if none suffices.
 
-
-def _trials(worn: WalkResult, drags: bool) -> RemedyTrials:
-    """Return the cause of missing help with its remedies; ``drags`` is True if the toes would drag."""
-    scenario = worn.scenario
+    ``drags`` is True if the toes would drag. Where the controller requests less torque at the lowest toes than the
+    actuator gives, a stiffer hold is tried; a limit that cuts the request is raised to the torque of the actuator.
+    """
+    scenario, requested, available = worn.scenario, 0.0, 0.0
+    settings, raised = scenario.controller.settings, _raised_pressures(scenario)
     if scenario.controller.kind == "off":
-        return "its controller is off", _LAWS, "another controller alone does not help"
-    requested, available = 0.0, 0.0
+        # A controller alone, and with the valve that it needs.
+        law, valve = "controller.kind=event_proportional", "device.valve=proportional"
+        return "its controller is off", ((law,), (law, valve)), "another controller alone does not help"
     if drags and "reference" in worn.averages:
         # Dorsiflexion torques at the lowest toes: requested, and of the actuator.
         timing = gait_timing(walk_of(scenario).gait)
@@ -290,28 +260,18 @@ def _trials(worn: WalkResult, drags: bool) -> RemedyTrials:
         lowest = first + int(worn.averages["toe_height"].mean[first:last].argmin())
         request, angle = (float(worn.averages[name].mean[lowest]) for name in ("reference", "angle"))
         requested, available = -request, -torque_reach(scenario.device, angle)[0]
-    if requested < _NEARLY * available and "hold_stiffness" in scenario.controller.settings:
-        return _stiffer_holds(scenario, requested, available)
-    other = "an actuator with more torque" if drags else "another timing of push-off"
-    return (
-        "the ankle is not lifted enough" if drags else "the torque opposes the motion",
-        [remedy(scenario, pressures).overrides for pressures in _raised_pressures(scenario)],
-        f"more supply pressure alone does not suffice; {other} was not tried",
-    )
-
-
-def _stiffer_holds(scenario: Scenario, requested: float, available: float) -> RemedyTrials:
-    """Return settings with which the controller requests more torque at the lowest toes as remedies, least first.
-
-    ``requested`` and ``available`` are the torques [N m] of controller and actuator there. A limit that cuts the
-    request is raised to the torque of the actuator.
-    """
-    settings, path = scenario.controller.settings, "controller.hold_stiffness"
+    path, other = "controller.hold_stiffness", "an actuator with more torque" if drags else "another timing of push-off"
+    if requested >= _NEARLY * available or "hold_stiffness" not in settings:
+        return (
+            "the ankle is not lifted enough" if drags else "the torque opposes the motion",
+            [remedy(scenario, pressures).overrides for pressures in raised],
+            f"more supply pressure alone does not suffice; {other} was not tried",
+        )
     limit = {"controller.largest_torque": available} if requested >= _NEARLY * settings["largest_torque"] else {}
     stiffness = max(float(settings["hold_stiffness"]), declared_numbers(scenario)[path].default or 0.0)
-    holds = [*([limit] if limit else []), *({**limit, path: factor * stiffness} for factor in _STIFFER)]
+    holds = [*([limit] if limit else []), *({**limit, path: factor * stiffness} for factor in (2.0, 4.0))]
     # A stiffer hold alone comes before one with more pressure: the valve may fill the chamber too slowly.
-    filled = [{**hold, **pressures} for hold in holds[-2:] for pressures in _raised_pressures(scenario)[:3]]
+    filled = [{**hold, **pressures} for hold in holds[-2:] for pressures in raised[:3]]
     largest = remedy(scenario, holds[-1]).overrides[-1].replace("=", " = ", 1)
     return (
         f"the ankle is not lifted enough, as the controller requests {_TORQUE.text(requested)} at the lowest toes, "
@@ -337,7 +297,7 @@ def _raised_pressures(scenario: Scenario) -> list[dict[str, float]]:
 # Data and files of a walk.
 
 
-def _walk_data(comparison: WalkComparison, verdict: Tracking) -> dict[str, Any]:
+def _walk_data(comparison: WalkComparison, verdict: ask.Tracking) -> dict[str, Any]:
     """Return ``walk.json``: metrics (with the device, without it, healthy) and events as plain data in SI units.
 
     ``verdict`` is on the torque that the controller requests. A bottle is described by its values, without the gas
@@ -360,7 +320,7 @@ def _walk_data(comparison: WalkComparison, verdict: Tracking) -> dict[str, Any]:
     )
     return {
         "format": WALK_FORMAT,
-        "schema_version": SCHEMA_VERSION,
+        "schema_version": 1,
         "units": UNITS,
         "status": plain(worn.status),
         "status_off": plain(bare.status),
@@ -387,7 +347,7 @@ def _walk_data(comparison: WalkComparison, verdict: Tracking) -> dict[str, Any]:
         },
         "shown": dict(scenario.device.shown),
         "tracking": {**plain(verdict), "sentence": verdict.sentence},
-        "gains": plain(gains_of(scenario)),
+        "gains": plain(ask.gains_of(scenario)),
         "minutes": float(worn.recording.time[-1]) / 60.0,
         **of_supply,
         "healthy": plain(dict(comparison.healthy)),
@@ -425,56 +385,52 @@ def _bottle_facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str
     return rows
 
 
-def comparison_table(comparison: WalkComparison) -> list[Column]:
+def comparison_table(comparison: WalkComparison) -> list[ask.Column]:
     """Return the table of metrics by row, with columns for the device, without it, and a healthy ankle."""
-    worn, bare = comparison.with_device, comparison.without_device
-    walked = [("with", worn.metrics), ("without", bare.metrics)]
-    columns: list[tuple[str, dict[str, float | str | None]]] = []
-    for head, metrics in (*walked, ("healthy", comparison.healthy)):
-        values: dict[str, float | str | None] = {"body_mass": walk_of(worn.scenario).wearer.body_mass}
+    walks = {"with": comparison.with_device.metrics, "without": comparison.without_device.metrics}
+    walker, columns = comparison.with_device.scenario, dict[str, dict[str, float | str | None]]()
+    for head, metrics in (walks | {"healthy": comparison.healthy}).items():
+        values: dict[str, float | str | None] = {"body_mass": walk_of(walker).wearer.body_mass}
         values |= {name: metric.value for name, metric in metrics.items()}
         if "lowest_toes" in metrics and metrics["lowest_toes"].value < 0.0:
-            values["lowest_toes"] = WOULD_DRAG
+            values["lowest_toes"] = "would drag"
         if "command_reversals" in metrics and "strides" in metrics and metrics["strides"].value > 0.0:
-            values[REVERSALS_PER_STRIDE] = metrics["command_reversals"].value / metrics["strides"].value
-        columns.append((head, values))
-    columns[0][1][LARGEST_TORQUE] = worn.scenario.controller.settings.get(LARGEST_TORQUE)
+            values["reversals_per_stride"] = metrics["command_reversals"].value / metrics["strides"].value
+        columns[head] = values
+    columns["with"]["largest_torque"] = walker.controller.settings.get("largest_torque")
     # The positive work of a healthy ankle is what the device's is a share of.
     if "positive_push_off_work" in comparison.healthy:
-        columns[-1][1]["push_off_share"] = 1.0
+        columns["healthy"]["push_off_share"] = 1.0
     # A number that no walk of the table has would be a row of dashes.
     rows = []
     for name, (title, quantity, digits) in _NUMBERS.items():
-        numbers = [values.get(name) for _, values in columns]
+        numbers = [values.get(name) for values in columns.values()]
         if any(number is not None for number in numbers):
-            kind = Kind(title, quantity=quantity)
+            kind = ask.Kind(title, quantity=quantity)
             # A number rounded to zero has no sign.
             texts = [f"{kind.shown(each):z.{digits}f}" if isinstance(each, float) else each for each in numbers]
             rows.append((kind.title, *texts))
-    return columns_of(["", *(head for head, _ in columns)], rows)
+    return ask.columns_of(["", *columns], rows)
 
 
-def strides_csv(result: WalkResult) -> bytes:
+def _strides_csv(result: WalkResult) -> bytes:
     """Return the numbers of each whole stride as CSV; the start of a stride is the sample after its heel strike."""
     # The last strike begins a stride that the end of the walk cuts off: it has no numbers.
     count = result.strides["gas"].size
     columns = {"stride [-]": np.arange(1.0, count + 1.0), "start [s]": result.recording.time[result.starts[:count]]}
-    columns |= {f"{name} [{quantity.unit}]": result.strides[name] for name, quantity in PER_STRIDE.items()}
-    return _csv(columns)
+    return _csv(columns | {f"{name} [{quantity.unit}]": result.strides[name] for name, quantity in PER_STRIDE.items()})
 
 
-def mean_stride_csv(result: WalkResult) -> bytes:
+def _mean_stride_csv(result: WalkResult) -> bytes:
     """Return mean and standard deviation over strides of each channel as CSV, at every percent of the stride."""
     # Without a whole stride the file has its head alone.
-    columns = {"phase [-]": PHASES} if result.averages else {"phase [-]": PHASES[:0]}
+    columns = {"phase [-]": PHASES if result.averages else PHASES[:0]}
     for name, curves in result.averages.items():
-        columns[f"{name} [{curves.unit}]"] = curves.mean
-        columns[f"{name}_deviation [{curves.unit}]"] = curves.deviation
+        columns |= {f"{name} [{curves.unit}]": curves.mean, f"{name}_deviation [{curves.unit}]": curves.deviation}
     return _csv(columns)
 
 
-def _csv(columns: Mapping[str, Floats]) -> bytes:
+def _csv(columns: Mapping[str, ask.Floats]) -> bytes:
     """Return simulated columns as CSV."""
     rows = (",".join(map(repr, row)) for row in zip(*(values.tolist() for values in columns.values()), strict=True))
-    lines = ["# simulated: a model's own output, not measured", ",".join(columns), *rows]
-    return ("\n".join(lines) + "\n").encode()
+    return "\n".join(["# simulated: a model's own output, not measured", ",".join(columns), *rows, ""]).encode()

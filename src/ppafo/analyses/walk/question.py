@@ -13,9 +13,6 @@ if TYPE_CHECKING:
     from ppafo.report.finding import Finding
     from ppafo.simulation.scenario import Scenario
 
-_LONG_WALK = 12.0
-"""Duration [min] above which a walk reports its progress."""
-
 
 @checked
 def walk_with_and_without(
@@ -57,7 +54,8 @@ def walk_with_and_without(
         chosen = load_walk(chosen, overrides, gait=gait, bottle=bottle)
 
     def report_minutes(done: float, total: float) -> None:
-        if progress is not None and total > _LONG_WALK:
+        # A shorter walk ends before a report of whole minutes says anything.
+        if progress is not None and total > 12.0:
             progress(Progress("walking", round(done), round(total), noun="min"))
 
     comparison = compare_walks(chosen, minutes=minutes, progress=report_minutes)
