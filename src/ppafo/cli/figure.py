@@ -2,11 +2,15 @@
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ppafo.arguments import FigureWidth, File, Folder
 from ppafo.cli import output
 from ppafo.cli.output import CommandOutput
 from ppafo.errors import DataError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _NAMED = 6
 """Number of figures that are named."""
@@ -34,17 +38,19 @@ def export_figure(folder: Folder, *, out: File | None = None, width: FigureWidth
             allowed = ", ".join(f".{name}" for name in FIGURE_FORMATS)
             raise DataError(f"--out {out}: the name must end in one of {allowed}")
         output.check_new_file(out)
-    from ppafo.analyses.stored_figures import draw_folder, names_in
     from ppafo.report.drawing import load_drawing
+    from ppafo.storage.owned_folder import entries_of
 
-    names = names_in(folder)
+    if not folder.is_dir():
+        raise DataError(f"{folder}: is not a folder")
+    names = sorted(entry.name for entry in entries_of(folder))
     load_drawing()
     from ppafo.report.style import drawn_at, render_figure
     from ppafo.storage.files import write_file
     from ppafo.storage.result_folder import add_to_folder
 
     with drawn_at(width):
-        figures = draw_folder(folder, names)
+        figures = _drawn(folder, names)
     if not figures:
         return _figures_to_open(folder, names, out, width)
     if out is None:
@@ -65,6 +71,38 @@ def export_figure(folder: Folder, *, out: File | None = None, width: FigureWidth
             "beside its recording"
         )
     return CommandOutput(f"written: {', '.join(written)}", {"files": written})
+
+
+def _drawn(folder: Path, names: list[str]) -> "dict[str, Figure]":
+    """Return the figures of a run, a walk, a study or rig recordings by the stem of their files; else none."""
+    from ppafo.analyses.endurance.discharge import WALK_FILE
+    from ppafo.analyses.study_results import load_study_results
+    from ppafo.report.recording_figure import recording_figure
+    from ppafo.report.stored_figure import draw_stored_walk, read_result, stated_units
+    from ppafo.rig.experiments import RIG_FILE
+    from ppafo.storage.owned_folder import MARK, read_json
+    from ppafo.storage.reading import read_recording
+    from ppafo.storage.result_folder import MANIFEST, NETCDF_FILE, RUN_FILE
+    from ppafo.units.shown import shown_in
+
+    if RUN_FILE in names:
+        return {"figure": read_result(folder).plot()}
+    if MANIFEST in names:
+        return {"figure": load_study_results(folder).plot()}
+    if RIG_FILE not in names and not {NETCDF_FILE, MARK} <= {*names}:
+        return {}
+    # The document of the folder has the truth of a recording, and the end of a walk.
+    file = folder / (RIG_FILE if RIG_FILE in names else WALK_FILE)
+    document = read_json(file) if file.name in names else {}
+    if not isinstance(document, dict):
+        raise DataError(f"{file}: must be a JSON object")
+    if file.name == WALK_FILE:
+        return {"figure": draw_stored_walk(file, document, read_recording(folder / NETCDF_FILE))}
+    drawn = {}
+    for name in (name for name in names if name.endswith(".csv")):
+        with shown_in(stated_units(file, document, "recordings", name)):
+            drawn[name.removesuffix(".csv")] = recording_figure(read_recording(folder / name))
+    return drawn
 
 
 def _figures_to_open(folder: Path, names: list[str], out: Path | None, width: float | None) -> CommandOutput:

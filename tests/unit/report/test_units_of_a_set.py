@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 import ppafo
-from ppafo.analyses.stored_figures import draw_folder, names_in
 from ppafo.parameters.parameter_set import written_units
 from ppafo.simulation.gains import gains_of, remark_on_following_gains
 from ppafo.studies.loading import load_study
@@ -188,7 +187,7 @@ def test_gauge_pressures_count_from_the_atmosphere_of_the_set_in_every_answer(in
     ppafo.sweep("torque-task-uncertainty", draws=4, out=tmp_path / "study", overrides=[*changes[:2], SHORT])
     assert ppafo.load_study_results(tmp_path / "study").units["gauge_zero"] == "70000.0 Pa_a"
     result.save(tmp_path / "run")
-    stored = draw_folder(tmp_path / "run", names_in(tmp_path / "run"))["figure"]
+    stored = ppafo.read_result(tmp_path / "run").plot()
     kept = next(axes for axes in stored.axes if axes.get_title(loc="left").startswith("Pressure"))
     assert max(max(line.get_ydata()) for line in kept.lines) == pytest.approx(largest, abs=1e-6)
     too_high = ppafo.simulate(TASK, overrides=[*high, "reference.level=9 N m"]).tracking
