@@ -6,6 +6,8 @@ values is interpolated linearly at position (n - 1) q: definition 7 of Hyndman a
 1996). The standard deviation divides by n - 1.
 """
 
+from __future__ import annotations
+
 import hashlib
 import math
 import tempfile
@@ -16,22 +18,13 @@ from operator import methodcaller
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ppafo.analyses import ask, np
 from ppafo.arguments import checked
 from ppafo.errors import DataError, StudyError, UnitError, at_fault, refused_as
-from ppafo.metrics import METRICS
-from ppafo.report.finding import Finding, Section, columns_of, facts
-from ppafo.report.kind import TIME, YES_OR_NO, Kind, of_path, of_stored_metric
-from ppafo.report.panels import Mark, Panel
-from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION, font_size
+from ppafo.report.kind import YES_OR_NO, of_stored_metric
+from ppafo.report.style import font_size
 from ppafo.signals.recording import CHANNELS
-from ppafo.simulation.numbers import NOISE_SEED
 from ppafo.storage.parquet import TableColumn, as_numpy, encode_texts, matrix_of, parquet_bytes, table_of
-from ppafo.studies.distributions import Floats
-from ppafo.studies.loading import list_studies, load_study
-from ppafo.studies.study import DEFAULT_SEED, Study
 from ppafo.study.blocks import MAXIMUM_RUNS_OF_CHUNK, samples_of
 from ppafo.study.runs import joined
 from ppafo.study.store import (
@@ -54,36 +47,25 @@ if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
     import pyarrow as pa
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from ppafo.studies.study import Study
 
 SUMMARY, BANDS = "summary.json", "bands.parquet"
 _EXAMPLES = 5
 """Number of failed runs that the summary names."""
-MAXIMUM_IN_MEMORY = 16_000_000
-"""Largest number of samples of a channel in memory when quantile bands are computed."""
-COLOURS = (BLUE, VERMILION, GREEN, ORANGE, GREY)
+COLOURS = (ask.BLUE, ask.VERMILION, ask.GREEN, ask.ORANGE, ask.GREY)
 """Colours of the configurations in a figure, which has no more of them than that."""
-MOST_METRICS, MOST_COMPARED = 4, 2
-"""Largest number of metrics in a figure, and with a panel for each configuration: more would be too low to read."""
 _MAXIMUM_POINTS = 3000
 """Largest number of runs in a curve, or in the points of a panel."""
-_COLUMNS, _PANEL, _COMPARED_PANEL = 2, (2.9, 2.4), (2.7, 2.3)
-"""Panels side by side in a figure; size of a panel [inches], and of one in a row that compares configurations."""
 _HISTOGRAM_BINS = 60
 """Largest number of bins in the histogram of a metric."""
-_OPACITIES = (0.18, 0.32, 0.45)
-"""Opacities of the bands of one channel, from the outermost to the innermost."""
-_CAPTION = (
-    "Distributions of the metrics, their dependence on the varied values, and quantiles over time where requested."
-)
-_ENOUGH = 0.5
-"""Smallest fraction of a configuration's runs that must complete: with fewer, the median is that of the failed runs."""
 _FLAGS = {
     "oscillating": "the loop oscillates (column 'oscillates')",
     "not_following": "the reference is not followed (column 'follows')",
     "without_verdict": "it is not known whether the reference is followed (column 'follows' is empty)",
 }
 """Counts of the summary that are said, in words."""
-Columns = dict[str, np.ndarray[Any, Any]]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -130,7 +112,7 @@ class StudyResults:
         metrics: Mapping[str, Mapping[str, Mapping[str, Any]]] = self.summary["configurations"]
         return metrics
 
-    def table(self, columns: Sequence[str] | None = None) -> Columns:
+    def table(self, columns: Sequence[str] | None = None) -> ask.Rows:
         """Return the rows of all runs, or some of their columns, as arrays by name; SI units, nan for missing values.
 
         Channels over time are not part of the table; ``trajectories`` returns them.
@@ -143,7 +125,7 @@ class StudyResults:
         columns = columns or [name for name in known if name not in traces]
         return joined([as_numpy(part) for part in self.chunks(columns)])
 
-    def to_dataframe(self, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
+    def to_dataframe(self, units: Mapping[str, str] | None = None) -> pandas.DataFrame:
         """Return the rows of all runs, like ``table``, in SI or in ``units``, such as ``{"supply.pressure": "bar_g"}``.
 
         ``attrs["units"]`` has the unit of each column; answers such as ``follows`` are booleans. Gauge pressures are
@@ -166,7 +148,7 @@ class StudyResults:
         frame.attrs = {"title": self.name, "units": shown | dict(units or {})}
         return frame
 
-    def by_configuration(self, column: str) -> Columns:
+    def by_configuration(self, column: str) -> ask.Rows:
         """Return a column of all runs, by name of the configuration.
 
         Runs with the same index have the same draw in all configurations.
@@ -182,16 +164,16 @@ class StudyResults:
             raise StudyError(f"the study stores no trajectories of '{channel}'{known_names(channel, stored)}")
         return self._matrix(channel)
 
-    def bands(self) -> Columns:
+    def bands(self) -> ask.Rows:
         """Return quantile bands over time as columns: configuration, channel, time, and a column for each quantile."""
         return as_numpy(self.folder.table(BANDS, digest=self.summary.get(BANDS)))
 
-    def known(self, configuration: str, column: str) -> Floats:
+    def known(self, configuration: str, column: str) -> ask.Floats:
         """Return the finite values of a column of the runs of a configuration."""
         values = np.concatenate([part.column(column).to_numpy() for part in self.chunks([column], configuration)])
         return np.asarray(values[np.isfinite(values)])
 
-    def chunks(self, columns: Sequence[str] | None = None, configuration: str | None = None) -> "Iterator[pa.Table]":
+    def chunks(self, columns: Sequence[str] | None = None, configuration: str | None = None) -> Iterator[pa.Table]:
         """Yield some columns chunk by chunk, of one configuration or of all."""
         # No chunk holds runs of two configurations, and each configuration has the same number of them.
         numbers = range(self.document["chunks"])
@@ -200,7 +182,7 @@ class StudyResults:
             numbers = numbers[of_each * self.configurations.index(configuration) :][:of_each]
         return (self.folder.table(chunk_file(number), columns) for number in numbers)
 
-    def _matrix(self, channel: str, configuration: str | None = None, samples: slice = slice(None)) -> Floats:
+    def _matrix(self, channel: str, configuration: str | None = None, samples: slice = slice(None)) -> ask.Floats:
         column = trace_column(channel)
         parts = self.chunks([column], configuration)
         return np.concatenate([matrix_of(part.column(column))[:, samples] for part in parts])
@@ -211,7 +193,7 @@ class StudyResults:
 
 
 @checked
-def load_study_results(folder: str | Path) -> Finding[StudyResults]:
+def load_study_results(folder: str | Path) -> ask.Finding[StudyResults]:
     """Return the finished results of a study in a folder; DataError if the folder contains none.
 
     >>> import ppafo
@@ -233,7 +215,7 @@ def load_study_results(folder: str | Path) -> Finding[StudyResults]:
 
 def studies_of_the_package() -> list[dict[str, Any]]:
     """Return name, number of runs and description of each study of the package."""
-    studies = [load_study(name) for name in list_studies()]
+    studies = [ask.load_study(name) for name in ask.list_studies()]
     return [{"name": study.name, "runs": study.runs, "description": study.description} for study in studies]
 
 
@@ -272,7 +254,7 @@ def summarise(study: Study, results: StudyResults) -> StudyResults:
         "failures": failures,
         "configurations": {
             name: {
-                metric: {"unit": METRICS[metric].unit, "summary": METRICS[metric].summary}
+                metric: {"unit": ask.METRICS[metric].unit, "summary": ask.METRICS[metric].summary}
                 | describe(known(name, metric), study.outputs.quantiles)
                 for metric in study.outputs.metrics
             }
@@ -288,7 +270,7 @@ def summarise(study: Study, results: StudyResults) -> StudyResults:
     return replace(results, summary=summary)
 
 
-def describe(values: Floats, fractions: Sequence[float]) -> dict[str, Any]:
+def describe(values: ask.Floats, fractions: Sequence[float]) -> dict[str, Any]:
     """Return count, mean, standard deviation, extremes, and quantiles by fraction.
 
     Without values there is only the count; the standard deviation needs two values.
@@ -313,9 +295,9 @@ def describe(values: Floats, fractions: Sequence[float]) -> dict[str, Any]:
 
 def _bands_file(study: Study, results: StudyResults) -> bytes:
     """Return the content of ``bands.parquet``: exact quantiles over the runs at each time."""
-    outputs, parts = study.outputs, list[Columns]()
-    # Samples are read in blocks that fit into the memory for all runs.
-    at_once = max(1, MAXIMUM_IN_MEMORY // study.runs_of_configuration)
+    outputs, parts = study.outputs, list[ask.Rows]()
+    # Samples are read in blocks of at most so many of all runs, which fit into the memory.
+    at_once = max(1, 16_000_000 // study.runs_of_configuration)
     for number, configuration in enumerate(study.configurations):
         samples = samples_of(study, configuration)
         for row, channel in enumerate(outputs.bands):
@@ -344,7 +326,7 @@ def _bands_file(study: Study, results: StudyResults) -> bytes:
     return parquet_bytes(table_of(columns, {"study": study.name}))
 
 
-def sorted_quantiles(ordered: Floats, counts: NDArray[np.int64], fractions: Sequence[float]) -> Floats:
+def sorted_quantiles(ordered: ask.Floats, counts: NDArray[np.int64], fractions: Sequence[float]) -> ask.Floats:
     """Return quantiles (fractions, columns) of the first ``counts`` values of sorted columns; nan for empty ones."""
     places = np.maximum(counts - 1, 0) * np.asarray(fractions)[:, None]
     low, columns = places.astype(np.int64), np.arange(counts.size)
@@ -353,7 +335,7 @@ def sorted_quantiles(ordered: Floats, counts: NDArray[np.int64], fractions: Sequ
 
 
 @in_units(lambda results: results.document["shown"])
-def finding_of(results: StudyResults) -> Finding[StudyResults]:
+def finding_of(results: StudyResults) -> ask.Finding[StudyResults]:
     """Return the results of a study as a finding; passed if enough runs of each configuration completed."""
     document, summary, study = results.document, results.summary, results.document["study"]
     runs, completed = document["runs"] // len(results.configurations), summary["completed_by_configuration"]
@@ -369,26 +351,29 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
             is_news = key == "not_following" and summary["without_verdict"].get(name, whole) < whole
             if (count := summary[key].get(name, 0)) or is_news:
                 said.append(f"{name}: in {count:,} of {whole:,} runs ({100.0 * count / max(whole, 1):.3g} %) {words}")
-    useless = [name for name, count in completed.items() if count < _ENOUGH * runs]
+    # With fewer than half of the runs, the median would be that of the failed ones.
+    useless = [name for name, count in completed.items() if 2 * count < runs]
     said += [f"{name}: most runs failed: the statistics of the others do not describe the study" for name in useless]
     rows = []
     for number in study.get("vary", ()):
         keys = (f"{key.replace('_', ' ')} {value}" for key, value in number.items() if key not in ("path", "kind"))
         rows.append((number["path"], number["kind"], ", ".join(keys)))
+    varied = ask.columns_of(("path", "kind", ""), rows)
     sampling = [
         f"Correlation of {pair['between'][0]} with {pair['between'][1]}: {pair['coefficient']}, of their normal scores."
         for pair in study.get("correlations", ())
     ]
     if sample := study.get("sample"):
-        method, seed = sample["method"].replace("_", " "), sample.get("seed", DEFAULT_SEED)
+        method, seed = sample["method"].replace("_", " "), sample.get("seed", ask.DEFAULT_SEED)
         sampling.append(f"Sampled by {method}: {sample['runs']} draws, seed {seed}.")
     assumed: dict[tuple[str, str, str], list[str]] = {}
     for name, scenario in document["scenarios"].items():
         for number in scenario["assumptions"]:
             assumed.setdefault((number["path"], number["value"], number["note"]), []).append(name)
-    assumptions = [(*assumption, ", ".join(names)) for assumption, names in assumed.items()]
-    files = (("rows of all runs", "runs/*.parquet"), ("summary", SUMMARY), ("study", "study.json"))
-    return Finding(
+    assumptions = ask.columns_of(
+        ("value", "", "why", "in"), ((*each, ", ".join(names)) for each, names in assumed.items())
+    )
+    return ask.Finding(
         name="sweep",
         kicker="Study",
         title=results.name,
@@ -396,15 +381,8 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
         parts=(
             replace(_figure(results), remarks=failures),
             *(_metrics(results, name) for name in results.configurations),
-            Section("What varied" if rows else "", columns_of(("path", "kind", ""), rows), left=3, is_detail=True),
-            Section(said=sampling, is_detail=True),
-            Section(
-                "What the base scenarios assume" if assumptions else "",
-                columns_of(("value", "", "why", "in"), assumptions),
-                left=4,
-                is_detail=True,
-            ),
-            Section("Files", facts(files), is_detail=True),
+            ask.Section("What varied" if rows else "", varied, remarks=sampling, left=3, is_detail=True),
+            ask.Section("What the base scenarios assume" if assumed else "", assumptions, left=4, is_detail=True),
         ),
         found=results,
         passed=not useless,
@@ -412,7 +390,7 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
     )
 
 
-def _metrics(results: StudyResults, name: str) -> Section:
+def _metrics(results: StudyResults, name: str) -> ask.Section:
     """Return the table of a configuration's metrics: number of runs, mean, standard deviation and quantiles."""
     described = [each for own in results.metrics.values() for each in own.values() if each["count"]]
     fractions = list(described[0]["quantiles"]) if described else []
@@ -425,21 +403,21 @@ def _metrics(results: StudyResults, name: str) -> Section:
             cells = [kind.number(own["mean"]), deviation, *map(kind.number, own["quantiles"].values())]
         rows.append([metric, kind.shown_unit, f"{own['count']:,}", *cells])
     completed = f"{name}: {results.summary['completed_by_configuration'][name]:,} runs completed"
-    return Section(columns=columns_of(head, rows), said=[completed], left=2)
+    return ask.Section(columns=ask.columns_of(head, rows), said=[completed], left=2)
 
 
-def _kinds(results: StudyResults) -> dict[str, Kind]:
+def _kinds(results: StudyResults) -> dict[str, ask.Kind]:
     """Return the kinds of varied paths and metrics from their stored units, also of a metric that no longer exists."""
     varied, metrics = results.document["varied"].items(), results.document["metrics"].items()
     return {
         # A column of every study, not a requested metric.
-        FOLLOWS: Kind(f"Follows its reference{YES_OR_NO}"),
-        **{path: of_path(path, each["unit"].removeprefix("-"), given=each["given"]) for path, each in varied},
+        FOLLOWS: ask.Kind(f"Follows its reference{YES_OR_NO}"),
+        **{path: ask.of_path(path, each["unit"].removeprefix("-"), given=each["given"]) for path, each in varied},
         **{name: of_stored_metric(name, each["unit"]) for name, each in metrics},
     }
 
 
-def _figure(results: StudyResults) -> Section:
+def _figure(results: StudyResults) -> ask.Section:
     """Return the figure of a study: panels of the metrics, and bands over time.
 
     A grid of two axes is drawn as maps, two drawn values as coloured points, all else as one panel for each metric.
@@ -458,12 +436,13 @@ def _figure(results: StudyResults) -> Section:
             chosen.setdefault(str(described[metric]), metric)
     differing = list(chosen.values()) or with_values[:1] or list(described)
     # The value of a seed has no meaning.
-    varied = [path for path in results.varied if path != NOISE_SEED]
+    varied = [path for path in results.varied if path != ask.NOISE_SEED]
     grid = [number["path"] for number in study.get("vary", ()) if number["kind"] in ("grid", "list")]
     # Over two paths each configuration has a panel of each metric, a map or points; else all share one panel.
     is_mapped = 2 in (len(grid), len(varied))
     is_compared = is_mapped and len(names) > 1
-    most = MOST_COMPARED if is_compared else MOST_METRICS
+    # More panels would be too low to read.
+    most = 2 if is_compared else 4
     # Metrics of a part of the run, such as rms_error_ramp, come after those of the whole run.
     of_part = {metric for metric in differing for whole in differing if metric.startswith(f"{whole}_")}
     metrics = sorted(differing, key=of_part.__contains__)[:most]
@@ -475,15 +454,14 @@ def _figure(results: StudyResults) -> Section:
     title = f"{results.name}, {results.summary['completed']:,} runs"
     title += f" over {len(varied)} values" * (not is_mapped and len(varied) > 1)
     count = len(metrics) + len(study["outputs"].get("bands", ()))
-    return Section(
+    return ask.Section(
         said=[" ".join(study["description"].split())] if study.get("description") else [],
         panels=partial(_panels, results, metrics, names, varied, grid),
         name="figure",
-        caption=_CAPTION
-        + f" Not drawn, because without a difference in the runs: {constant}." * bool(constant)
-        + f" Not drawn either, unless outputs.metrics names at most {most}: {left_out}." * bool(left_out),
-        across=len(names) if is_compared else min(_COLUMNS, max(1, count)),
-        size=_COMPARED_PANEL if is_compared else _PANEL,
+        caption=f"Not drawn, because without a difference in the runs: {constant}. " * bool(constant)
+        + f"Not drawn, unless outputs.metrics names at most {most}: {left_out}." * bool(left_out),
+        across=len(names) if is_compared else min(2, max(1, count)),
+        size=(2.7, 2.3) if is_compared else (2.9, 2.4),
         title=title,
         is_detail=True,
     )
@@ -491,9 +469,9 @@ def _figure(results: StudyResults) -> Section:
 
 def _panels(
     results: StudyResults, metrics: Sequence[str], names: Sequence[str], varied: Sequence[str], grid: Sequence[str]
-) -> list[Panel]:
+) -> list[ask.Panel]:
     """Return a panel for each metric and each band; over two paths, a panel of a metric for each configuration."""
-    kinds, panels = _kinds(results), list[Panel]()
+    kinds, panels = _kinds(results), list[ask.Panel]()
     for metric in metrics:
         kind, values = kinds[metric], results.by_configuration(metric)
         if len(grid) == 2:
@@ -503,8 +481,8 @@ def _panels(
                 # An odd step: an even one would see one half of a grid whose last axis has two values.
                 step = -(-values[name].size // _MAXIMUM_POINTS) | 1
                 x, y = (results.by_configuration(path)[name][::step] for path in varied)
-                dots = Mark("points", x, y, kind.values(values[name][::step]))
-                panels.append(Panel(kinds[varied[0]], kinds[varied[1]], [dots], scale=kind))
+                dots = ask.Mark("points", x, y, kind.values(values[name][::step]))
+                panels.append(ask.Panel(kinds[varied[0]], kinds[varied[1]], [dots], scale=kind))
         elif len(varied) == 1:
             across, marks = results.by_configuration(varied[0]), []
             for name, colour in zip(results.configurations, COLOURS, strict=False):
@@ -512,8 +490,8 @@ def _panels(
                 order = np.argsort(across[name], kind="stable")
                 order = order[:: max(1, order.size // _MAXIMUM_POINTS)]
                 x, y = across[name][order], values[name][order]
-                marks.append(Mark("line", x, y, label=name, colour=colour, style={"marker": "."}))
-            panels.append(Panel(kinds[varied[0]], kind, marks))
+                marks.append(ask.Mark("line", x, y, label=name, colour=colour, style={"marker": "."}))
+            panels.append(ask.Panel(kinds[varied[0]], kind, marks))
         else:
             panels.append(_histogram(values, kind))
     if 2 in (len(grid), len(varied)) and len(names) > 1:
@@ -524,12 +502,12 @@ def _panels(
     return [replace(panel, legend="inside" if panel is with_names else "") for panel in panels]
 
 
-def _histogram(by_name: Columns, kind: Kind) -> Panel:
+def _histogram(by_name: ask.Rows, kind: ask.Kind) -> ask.Panel:
     """Return a panel with the histogram of a metric for every configuration."""
     known = {name: values[np.isfinite(values)] for name, values in by_name.items()}
     values = np.concatenate(list(known.values()))
     if not values.size:
-        return Panel(kind, Kind(), (), then=methodcaller("set", yticks=[]))
+        return ask.Panel(kind, ask.Kind(), (), then=methodcaller("set", yticks=[]))
     low, high, ticks = float(values.min()), float(values.max()), {}
     if high == low:
         # One bar about the only value.
@@ -540,15 +518,20 @@ def _histogram(by_name: Columns, kind: Kind) -> Panel:
     else:
         edges = np.linspace(low, high, 1 + min(_HISTOGRAM_BINS, max(8, round(values.size**0.5))))
     marks = [
-        Mark("bars", edges, np.histogram(own, edges)[0], label=name, colour=colour)
+        ask.Mark("bars", edges, np.histogram(own, edges)[0], label=name, colour=colour)
         for (name, own), colour in zip(known.items(), COLOURS, strict=False)
     ]
-    return Panel(kind, Kind(), marks, then=methodcaller("set", yticks=[], **ticks))
+    return ask.Panel(kind, ask.Kind(), marks, then=methodcaller("set", yticks=[], **ticks))
 
 
 def _map(
-    results: StudyResults, grid: Sequence[str], values: Floats, name: str, kinds: Mapping[str, Kind], kind: Kind
-) -> Panel:
+    results: StudyResults,
+    grid: Sequence[str],
+    values: ask.Floats,
+    name: str,
+    kinds: dict[str, ask.Kind],
+    kind: ask.Kind,
+) -> ask.Panel:
     """Return a map of the mean of a metric over two paths for one configuration; white if no run completed."""
     (columns, column), (rows, row) = (
         np.unique(results.by_configuration(path)[name], return_inverse=True) for path in grid
@@ -558,27 +541,27 @@ def _map(
     count, total = (np.bincount(cell[known], weights, minlength=cells) for weights in (None, values[known]))
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(rows.size, columns.size)
     declared = {number["path"]: number for number in results.document["study"]["vary"]}
-    axis_kinds, places, settings = list[Kind](), list[Floats](), dict[str, Any]()
+    axis_kinds, places, settings = list[ask.Kind](), list[ask.Floats](), dict[str, Any]()
     for side, path, levels in zip("xy", grid, (columns, rows), strict=True):
         axis_kinds.append(kinds[path])
         places.append(levels)
         if declared[path]["kind"] == "list":
             # Drawn side by side, in cells of equal size, with their values at the ticks.
-            axis_kinds[-1], places[-1] = Kind(kinds[path].axis), np.arange(float(levels.size))
+            axis_kinds[-1], places[-1] = ask.Kind(kinds[path].axis), np.arange(float(levels.size))
             labels = [f"{value:g}" for value in kinds[path].values(levels)]
             settings |= {f"{side}ticks": places[-1], f"{side}ticklabels": labels}
         elif declared[path].get("spacing") == "logarithmic":
             settings[f"{side}scale"] = "log"
 
-    def mark_axes(axes: "Axes") -> None:
+    def mark_axes(axes: Axes) -> None:
         axes.grid(visible=False)
         axes.set(**settings)
 
-    marks = [Mark("map", places[0], places[1], kind.values(mean))]
-    return Panel(axis_kinds[0], axis_kinds[1], marks, scale=kind, then=mark_axes)
+    marks = [ask.Mark("map", places[0], places[1], kind.values(mean))]
+    return ask.Panel(axis_kinds[0], axis_kinds[1], marks, scale=kind, then=mark_axes)
 
 
-def _band(results: StudyResults, channel: str) -> Panel:
+def _band(results: StudyResults, channel: str) -> ask.Panel:
     """Return a panel with the quantile bands of a channel, the outermost pair of quantiles light, the next darker."""
     table = results.bands()
     # The quantiles that the study asked for are the columns of its file.
@@ -587,12 +570,12 @@ def _band(results: StudyResults, channel: str) -> Panel:
     marks = []
     for name, colour in zip(results.configurations, COLOURS, strict=False):
         rows = (table["configuration"] == name) & (table["channel"] == channel)
-        for pair, opacity in zip(pairs, _OPACITIES, strict=False):
+        for pair, opacity in zip(pairs, (0.18, 0.32, 0.45), strict=False):
             ends = np.stack([table[f"q{fraction:g}"][rows] for fraction in pair])
-            marks.append(Mark("band", table["time"][rows], ends, colour=colour, style={"alpha": opacity}))
+            marks.append(ask.Mark("band", table["time"][rows], ends, colour=colour, style={"alpha": opacity}))
         if 0.5 in fractions:
-            marks.append(Mark("line", table["time"][rows], table["q0.5"][rows], label=name, colour=colour))
+            marks.append(ask.Mark("line", table["time"][rows], table["q0.5"][rows], label=name, colour=colour))
     unit = CHANNELS[channel].unit
-    kind = Kind(channel.replace("_", " ").capitalize(), unit, quantity_of_unit(unit))
+    kind = ask.Kind(channel.replace("_", " ").capitalize(), unit, quantity_of_unit(unit))
     title = f"{', '.join(f'{100.0 * fraction:g}' for fraction in fractions)} % of runs below"
-    return Panel(TIME, kind, marks, then=lambda axes: axes.set_title(title, fontsize=font_size(9.0)))
+    return ask.Panel(ask.TIME, kind, marks, then=lambda axes: axes.set_title(title, fontsize=font_size(9.0)))

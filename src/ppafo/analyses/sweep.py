@@ -11,6 +11,7 @@ from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from ppafo.analyses import ask, np
 from ppafo.arguments import Count, Executor, Overrides, Seed, Threads, Word, checked
 from ppafo.errors import StudyError
 from ppafo.plugins import Plugins, name_plugins
@@ -27,8 +28,6 @@ Folder = Annotated[str | Path, Word("DIR")]
 Agreed = Annotated[bool, Word(option="--yes")]
 LOG = "log.jsonl"
 """Name of the log file, the only file with date, machine and speed; all other files are equal on any machine."""
-INTERRUPTED = "interrupted; finished chunks are kept, and the same command resumes the study"
-INTERRUPTED_AT_ONCE = "interrupted before the first chunk was finished; the same command starts the study again"
 
 
 @checked
@@ -78,25 +77,20 @@ def sweep(
     (8, 8)
     """
     name_plugins(plugins)
-    import numpy as np
-
     from ppafo.analyses.study_results import SUMMARY, StudyResults, finding_of, summarise
-    from ppafo.metrics import METRICS
     from ppafo.simulation.gains import warn_of_gains
     from ppafo.storage.files import temporary_folder
-    from ppafo.studies.loading import study_of
     from ppafo.studies.study import NO_SAMPLE
-    from ppafo.study.executing import computed_by, executor_of
-    from ppafo.study.runs import RunCounter
+    from ppafo.study.executing import computed_by
     from ppafo.study.store import claim, compute_chunk, read_manifest, study_folder
     from ppafo.version import __version__
 
-    workers = executor_of(executor)
-    chosen = study_of(study, overrides, draws, seed)
+    workers = ask.executor_of(executor)
+    chosen = ask.study_of(study, overrides, draws, seed)
     if chosen.drawn and chosen.sample.method is None:
         raise StudyError(f"study '{chosen.name}': {NO_SAMPLE}")
     if not (chosen.outputs.metrics or chosen.outputs.traces):
-        said = f"(such as {', '.join(list(METRICS)[:4])}), trajectories or bands"
+        said = f"(such as {', '.join(list(ask.METRICS)[:4])}), trajectories or bands"
         raise StudyError(f"study '{chosen.name}': [outputs] is empty: give metrics {said}")
     kept = temporary_folder("ppafo-study") if out is None else None
     folder = study_folder(kept.name if kept is not None else str(out))
@@ -108,7 +102,7 @@ def sweep(
     chunks, finished = claim(chosen, folder, agreed, threads, report)
     missing = [chunk for chunk in chunks if chunk.number not in finished]
     earlier = sum(chunk.runs for chunk in chunks) - sum(chunk.runs for chunk in missing)
-    counter = RunCounter(chosen.runs, progress, earlier, sum(finished.values()))
+    counter = ask.RunCounter(chosen.runs, progress, earlier, sum(finished.values()))
     # The first chunk may wait for a compiler.
     counter.add(0, 0)
     # Rows change below: an old summary would pass for a finished study meanwhile.
@@ -157,12 +151,11 @@ def sweep_into_folder(
     """
     from ppafo.report.drawing import load_drawing
     from ppafo.report.finding import page_files, text_of
-    from ppafo.studies.loading import study_of
     from ppafo.study.store import study_folder
 
     # A module imported below may import Matplotlib, slowly: load_drawing imports it first, without its slow parts.
     load_drawing()
-    chosen = study_of(study, overrides, draws, seed)
+    chosen = ask.study_of(study, overrides, draws, seed)
     # A text stays a text: in a Path, a URL is no longer recognised as one.
     folder = study_folder(out or Path("out") / chosen.name)
     try:
@@ -172,5 +165,7 @@ def sweep_into_folder(
             folder.write(name, content)
     except KeyboardInterrupt:
         is_begun = any(name.startswith("finished/") for name in folder.names())
-        raise KeyboardInterrupt(INTERRUPTED if is_begun else INTERRUPTED_AT_ONCE) from None
+        said = "interrupted before the first chunk was finished; the same command starts the study again"
+        said = "interrupted; finished chunks are kept, and the same command resumes the study" if is_begun else said
+        raise KeyboardInterrupt(said) from None
     return swept
