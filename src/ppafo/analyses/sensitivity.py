@@ -51,24 +51,14 @@ DistributedStudy = Annotated[
     "Study | str | Path | Mapping[str, Any]", Word("STUDY", help="a study with distributions: a name, or a .toml file")
 ]
 MethodName = Annotated[str, Word("sobol|shapley")]
-_ENDS = (0.05, 0.95)
-"""Quantiles of a varied value between which the change of a metric is computed."""
 DEFAULT_SAMPLES = {"sobol": 8192, "shapley": 2048}
 """Default number of blocks by method: tens of thousands of runs for a few values."""
 _FEWEST, _MOST = 64, 2**17
 """Limits of the number of blocks."""
-_FEWEST_WHOLE = 4
-"""Smallest number of complete blocks for an estimate."""
-_SIZES = 6
-"""Number of sample sizes at which the indices are shown: all blocks, and repeated halves."""
 _NEGLIGIBLE = 0.01
 """Fraction of the largest index below which the influence of a value counts as negligible."""
-_INCHES_OF_A_BAR = 0.27
-"""Height of the row of a varied value in a panel [inches]."""
 _MAXIMUM_LINES = 5
 """Number of varied values whose indices are plotted over the sample size."""
-_MOST_SIZES = 3
-"""Largest number of sample sizes with a tick, whose labels would run together if there were more."""
 _TITLES = {"total": "total", "first": "first order", "shapley": "Shapley effect"}
 SCRAMBLES = 8
 """Number of independent scrambles of the Sobol sequence, to which base points are assigned in turn."""
@@ -76,10 +66,6 @@ _INNER = 3
 """Number of draws of the free values for each conditional variance (Song, Nelson and Staum, 2016)."""
 _SMALLEST = 2.0**-53
 """Smallest fraction of a draw; normal scores are finite from this fraction to 1 minus this fraction."""
-_ONE = 0.6827
-"""Confidence level of an interval of plus and minus one standard deviation."""
-_NEAREST = 0.2
-"""Fraction of the runs, nearest to an end of a value, to which the parabola is fitted."""
 
 
 @checked
@@ -164,11 +150,6 @@ class Indices:
     bands: Mapping[str, Floats]
     blocks: int = 0
     used: int = 0
-
-    @property
-    def ranking(self) -> Floats:
-        """Index that ranks the inputs, the first of them (paths,)."""
-        return next(iter(self.values.values()))
 
 
 class Method(NamedTuple):
@@ -324,9 +305,10 @@ def _change(
         return math.nan, math.nan
     whole, nearer = (
         np.subtract(*(_levels(values, inputs, float(end), part, nearest) for end in ends[::-1]))
-        for nearest in (_NEAREST, 0.5 * _NEAREST)
+        for nearest in (0.2, 0.1)
     )
-    spread, bend_spread = ask.jackknife_reach(whole[1:], confidence), ask.jackknife_reach((whole - nearer)[1:], _ONE)
+    # Of the bend the interval of one standard deviation.
+    spread, bend_spread = (ask.jackknife_reach(*of) for of in ((whole[1:], confidence), ((whole - nearer)[1:], 0.6827)))
     # Of the square of the difference, what is chance on average is no bend.
     bend = math.sqrt(max(float((whole - nearer)[0] ** 2 - bend_spread**2), 0.0))
     return float(whole[0]), float(spread) + 2.0 * bend
@@ -451,10 +433,10 @@ def analyse(
         whole = np.flatnonzero(known.all(axis=1))
         # All blocks, and halves, and halves of halves, as far as they say something: many of the first may be left out,
         # and a metric that counts may be the same in all.
-        halved = {samples >> halvings for halvings in range(_SIZES)}
+        halved = {samples >> halvings for halvings in range(6)}
         for size in sorted({size for size in halved if size >= _FEWEST} | {samples}):
             first = whole[whole < size]
-            if first.size >= _FEWEST_WHOLE and float(np.ptp(table[first])) > 0.0:
+            if first.size >= 4 and float(np.ptp(table[first])) > 0.0:
                 estimated = method.indices(table[first], first, len(uncertainty.drawn), seed, confidence)
                 settling.append(Indices(*estimated, size, first.size))
         if not settling or settling[-1].blocks != samples:
@@ -467,7 +449,9 @@ def analyse(
         changes = []
         for number in uncertainty.drawn:
             # A seed has no order: from its 5 to its 95 % quantile nothing changes.
-            ends = number.distribution.values(np.array(_ENDS)) * (np.nan if number.path == ask.NOISE_SEED else 1.0)
+            ends = number.distribution.values(np.array([0.05, 0.95])) * (
+                np.nan if number.path == ask.NOISE_SEED else 1.0
+            )
             inputs = columns[number.path].reshape(samples, -1)[whole].ravel()
             # About the mean, because the sums of the lines below cancel.
             changes.append(_change(values - np.mean(values), inputs, ends, part, confidence))
@@ -514,17 +498,14 @@ def finding_of(found: Influences) -> Finding[Influences]:
     for name, number in found.constant.items():
         sentences.append(f"{name} is {ask.of_metric(name).text(number)} in every run: no value influences it")
     caption = f"Left: indices with confidence bands, {first} filled{''.join(f', {other} open' for other in others)}."
-    caption += " Right: convergence of the largest indices with the sample size, in the colours and markers of the left"
-    caption += " panel."
-    if any(found.gains[:1]):
-        caption += " Settings of the controller are recomputed in every run."
+    caption += " Right: convergence of the largest indices with the sample size, in the same colours and markers."
     figure = ask.Section(
         "Indices and their convergence",
         panels=partial(_panels, found),
         name="sensitivity",
         caption=caption,
         across=2,
-        size=(3.0, max(2.5, 0.9 + _INCHES_OF_A_BAR * len(found.paths))),
+        size=(3.0, max(2.5, 0.9 + 0.27 * len(found.paths))),
         title=f"Sensitivity of {found.study}",
         is_detail=True,
     )
@@ -546,7 +527,7 @@ def _part(found: Influences, metric: MetricSensitivity) -> ask.Section:
     error is not attributed to interactions.
     """
     kind, indices, remarks = ask.of_metric(metric.metric, "+.3g"), metric.indices, list[str]()
-    ranking, reach = indices.ranking, next(iter(indices.bands.values()))
+    ranking, reach = (next(iter(each.values())) for each in (indices.values, indices.bands))
     order = np.argsort(-ranking).tolist()
     columns = [ask.Column("value", [found.paths[row] for row in order])]
     for name, values in indices.values.items():
@@ -591,28 +572,27 @@ def _panels(found: Influences) -> list[ask.Panel]:
     def set_sizes(axes: Axes, sizes: Sequence[int]) -> None:
         """Make the axis of the sizes logarithmic, with ticks at the largest size and at even steps below."""
         axes.set_xscale("log", base=2)
-        ticks = sizes[:: -math.ceil(len(sizes) / _MOST_SIZES)]
+        # The labels of more than three would run together.
+        ticks = sizes[:: -math.ceil(len(sizes) / 3)]
         axes.set_xticks(ticks, [str(size) for size in ticks])
         axes.minorticks_off()
 
     panels = list[ask.Panel]()
     for metric in found.metrics:
-        indices, order, bars, courses = (
-            metric.indices,
-            np.argsort(-metric.indices.ranking),
-            list[ask.Mark](),
-            list[ask.Mark](),
-        )
+        indices, bars, courses = metric.indices, list[ask.Mark](), list[ask.Mark]()
+        name, sizes = next(iter(indices.values)), [step.blocks for step in metric.settling]
+        order = np.argsort(-indices.values[name])
         colours = [ask.COLOURS[rank] if rank < _MAXIMUM_LINES else ask.GREY for rank in range(order.size)]
         places = np.arange(order.size)[::-1]
-        for (name, values), filled, shift in zip(indices.values.items(), ("full", "none"), (0.14, -0.14), strict=False):
+        for (index, values), filled, shift in zip(
+            indices.values.items(), ("full", "none"), (0.14, -0.14), strict=False
+        ):
             for row, colour, place in zip(order, colours, places, strict=True):
                 style = {"markersize": 5, "elinewidth": 1.4, "fillstyle": filled, "fmt": ask.MARKERS.get(colour, "o")}
                 # One entry of the legend for each index: the markers of the first row.
-                label = _TITLES[name] if row == order[0] and len(indices.values) > 1 else ""
-                at = [values[row]], [place + shift], [indices.bands[name][row]]
+                label = _TITLES[index] if row == order[0] and len(indices.values) > 1 else ""
+                at = [values[row]], [place + shift], [indices.bands[index][row]]
                 bars.append(ask.Mark("reach", *at, label, colour, style))
-        name, sizes = next(iter(indices.values)), [step.blocks for step in metric.settling]
         settled = np.array([[step.values[name], step.bands[name]] for step in metric.settling])
         for row, colour in zip(order[:_MAXIMUM_LINES], colours, strict=False):
             values, bands = settled[:, :, row].T
