@@ -26,17 +26,10 @@ ScenarioLike = Annotated["Scenario | str | Path", Word("SCENARIO", help="name of
 VariedRange = Annotated[str, Word("PATH=LOW..HIGH", option="--vary")]
 Condition = Annotated[str, Word("CONDITION", option="--such-that")]
 Highest = Annotated[bool, Word(off="--lowest", help="find the lowest value (default)")]
-FEWEST, MOST = 3, 100_000
-"""Range of the number of grid values: both ends and one between, up to the maximum."""
 ACCURACY = 1.0e-6
 """Width of the last bracket, as a fraction of the range of values [-]."""
 FOLLOWS = "follows"
 """Text of the condition that the run follows its reference, by the verdict of ``simulate``, within the reach."""
-_PARTS = 32
-"""Number of parts into which a bracket is divided: this many parallel runs take little longer than one run."""
-_STREAMS, _SEED = 16, 1
-"""Number of noise streams for every value if sensors are noisy, the same for all values, and their random seed."""
-_RANGE, _CONDITION = r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*", r"\s*([\w.:]+)\s*(<=|>=)\s*(.+?)\s*"
 _SETTLED = "RMS error in the second half of the hold"
 """Number that decides in place of the error of one instant, for a loop that swings."""
 
@@ -130,10 +123,11 @@ def find(
             path, low, high = _range(vary, base)
         with at_fault("such_that"):
             limit = _limit(such_that, base, path.path)
-        if not FEWEST <= grid <= MOST:
-            raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
-        # The same streams for all values, so that neighbours differ by the value alone.
-        seeds = ask.seeds_of_noise([base], [path.path], _STREAMS, _SEED)
+        # Both ends and one between.
+        if not 3 <= grid <= 100_000:
+            raise StudyError(f"grid = {grid}: must be at least 3 and at most 100,000")
+        # Of noisy sensors the same 16 streams for all values, so that neighbours differ by the value alone.
+        seeds = ask.seeds_of_noise([base], [path.path], 16, 1)
         streams, reach_varies = max(1, seeds.size), ask.changes_reach([path.path])
         runs = ask.scenario_runs(base, [limit.metric], ask.RunCounter(grid * streams, progress), (), threads)
 
@@ -196,7 +190,7 @@ def find(
 
 def _range(text: str, base: Scenario) -> tuple[ask.VariedPath, float, float]:
     """Return path, lower and upper bound [SI] of a text ``PATH=LOW..HIGH``; StudyError for any other text."""
-    quoted, parts = f"'{one_line(text)}'", re.fullmatch(_RANGE, text)
+    quoted, parts = f"'{one_line(text)}'", re.fullmatch(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*", text)
     if parts is None:
         raise StudyError(f"{quoted} is not of the form PATH=LOW..HIGH, for example 'supply.pressure=20..90 psi_g'")
     name, lower, upper = parts.groups()
@@ -214,7 +208,7 @@ def _limit(text: str, base: Scenario, path: str) -> ask.MetricLimit:
 
     Gauge pressures refer to the ambient pressure of the scenario, unless ``path``, the varied number, is this pressure.
     """
-    quoted, parts = f"'{one_line(text)}'", re.fullmatch(_CONDITION, text)
+    quoted, parts = f"'{one_line(text)}'", re.fullmatch(r"\s*([\w.:]+)\s*(<=|>=)\s*(.+?)\s*", text)
     if text.strip() == FOLLOWS:
         # Every value that is found follows its reference; of two that do not, the error says which is nearer.
         tracked = (f"rms_{base.controlled}_error", "rms_error", "torque_error", "peak_torque")
@@ -257,8 +251,8 @@ def outermost(
         value, neighbour = rows["value"][[index, outer]].tolist()
         if abs(value - neighbour) <= ACCURACY * (high - low):
             return rows, index, outer
-        # Runs of a bracket are simulated side by side, which is faster than one run at a time by bisection.
-        values = np.linspace(value, neighbour, _PARTS + 1)[1:-1]
+        # 32 parts of a bracket are run side by side, which takes little longer than one run of a bisection.
+        values = np.linspace(value, neighbour, 33)[1:-1]
         more = {"value": values, **tried(values), "is_of_grid": np.full(values.size, False)}
         order = np.argsort(np.concatenate([rows["value"], values]), kind="stable")
         rows = {name: np.concatenate([column, more[name]])[order] for name, column in rows.items()}
