@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import product
+from itertools import cycle, islice, product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -34,13 +34,7 @@ AS_WRITTEN = "as written"
 """Task name of scenarios that run as written, without overrides of a task."""
 DEFAULT_DRAWS = 4096
 """Default number of draws of the uncertain values."""
-_FEWEST_EFFECTIVE = 50.0
-"""Smallest effective number of draws for which a normal interval is accurate to half a percent."""
-_SAME = 1.0e-9
-"""Relative difference up to which two values count as equal."""
 _GAS = "gas_supplied"
-_OUTER_QUANTILES = (0.05, 0.95)
-"""Quantiles over the draws that tables show next to the median."""
 _READING = (
     "The intervals of the mean difference and of the probability show how precisely the draws estimate them; they "
     "shrink with more draws. The change from 5 to 95 % of the draws shows the effect of the uncertain values; it "
@@ -50,17 +44,6 @@ _NOISE = (
     "sensors are noisy: every draw has its own noise, the same in all configurations; the nominal change is "
     "one realisation"
 )
-_PARETO = (
-    "Marks: the nominal device; dots: draws. The line joins the configurations that no other configuration beats in "
-    "both error and gas."
-)
-_MARKS = "osD^vP"
-_MAXIMUM_DOTS = 1500
-_BINS = 40
-_TICKS_OF_CHANGE = 4
-"""Largest number of tick intervals on the axis of the change, so that labels such as -98.85 do not touch."""
-_SHOWN_PERCENTILES = (0.5, 99.5)
-"""Percentiles between which changes are plotted; a few distant ones would squeeze all others into one bar."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,12 +307,10 @@ def _check_different_values(study: Study, scenarios: Mapping[tuple[str, str], Sc
         # Orifices of different valves are meant to differ: what the study draws replaces the value of each.
         if path.startswith("valve.") or path == ask.NOISE_SEED:
             continue
-        declared = [
-            ask.value_at(path, scenario) for (_, name), scenario in scenarios.items() if study.varies(path, name)
-        ]
+        declared = (ask.value_at(path, each) for (_, name), each in scenarios.items() if study.varies(path, name))
         values = [value for value in declared if value is not None]
         lowest, highest = min(values, default=0.0), max(values, default=0.0)
-        if highest - lowest > _SAME * max(abs(lowest), abs(highest)):
+        if highest - lowest > 1.0e-9 * max(abs(lowest), abs(highest)):
             varied = ask.varied_path(path, next(iter(scenarios.values())))
             raise StudyError(
                 f"the study draws '{path}' for every configuration, so the values {varied.quote(lowest)} and "
@@ -425,11 +406,7 @@ def pareto_front(points: ask.Floats) -> NDArray[Any]:
 
 
 def compare_pairs(
-    baseline: ask.Floats,
-    other: ask.Floats,
-    better: int,
-    confidence: float,
-    draws: int | None = None,
+    baseline: ask.Floats, other: ask.Floats, better: int, confidence: float, draws: int | None = None
 ) -> PairedMetric | None:
     """Return the paired statistics of values (runs,) [SI], nan for a missing value; None without any pair.
 
@@ -444,9 +421,7 @@ def compare_pairs(
         return None
     # Relative to the size of the baseline, so that the sign is the difference's; a baseline of 0 has no fractions.
     change = (other_values - baseline_values)[baseline_values != 0.0] / np.abs(baseline_values[baseline_values != 0.0])
-    low, middle, high = (
-        np.quantile(change, (_OUTER_QUANTILES[0], 0.5, _OUTER_QUANTILES[1])) if change.size else (np.nan,) * 3
-    )
+    low, middle, high = np.quantile(change, (0.05, 0.5, 0.95)) if change.size else (np.nan,) * 3
     difference, repeated = np.split(all_runs, [baseline.size])
     # A tie is no win on either side: of equal configurations neither is better in any draw.
     wins = np.where(both, better * difference > 0.0, np.nan)
@@ -507,8 +482,9 @@ def _remarks(found: ComparisonResult) -> list[str]:
                 f"of {pair.effective_size:.3g} of {pair.pairs:,} draws: do not trust its interval; the probability of "
                 "being better is not affected"
                 for metric, pair in case.pairs.items()
-                # Of few draws half their number suffices: if all are equal, the interval has no width and is reliable.
-                if pair.effective_size < min(_FEWEST_EFFECTIVE, 0.5 * pair.pairs)
+                # From 50 on a normal interval is accurate to half a percent. Of few draws half their number suffices:
+                # if all are equal, the interval has no width and is reliable.
+                if pair.effective_size < min(50.0, 0.5 * pair.pairs)
             ]
     # Several tasks may have the same remark.
     return [*dict.fromkeys(filter(None, remarks)), *failed, *uncertain, *([_NOISE] if found.has_noise else [])]
@@ -530,13 +506,18 @@ def _finding(found: ComparisonResult, check: bool, overrides: Sequence[str]) -> 
         lead += f"{found.draws:,} draws of {count_of(len(found.varied), 'uncertain value')}{beside}, the same for all; "
         lead += f"each interval with {100.0 * found.confidence:g} % confidence"
     pareto = ask.Section(
-        "Error against gas", panels=partial(_front_panels, found), name="pareto", caption=_PARETO, is_detail=True
+        "Error against gas",
+        panels=partial(_front_panels, found),
+        name="pareto",
+        caption="Marks: the nominal device; dots: draws. The line joins the configurations that no other one beats in "
+        "both.",
+        is_detail=True,
     )
+    # The axes and the legend say what is drawn.
     change = ask.Section(
-        "Spread of the change",
+        "Spread of the change over the draws",
         panels=partial(_change_panels, found),
         name="change",
-        caption="Change against the baseline in each draw; the dashed line is the nominal device.",
         across=2,
         size=(3.0, 2.5),
         is_detail=True,
@@ -635,8 +616,7 @@ def _percent(fraction: float) -> str:
 def _colours(cases: Sequence[ComparedCase]) -> dict[str, str]:
     """Return a colour for each configuration: colours of the valves if all differ, else of the palette in order."""
     colours = [ask.look_of_valve(case.scenario.device.valve.kind).colour for case in cases]
-    if len(set(colours)) < len(colours):
-        colours = [ask.COLOURS[row % len(ask.COLOURS)] for row in range(len(colours))]
+    colours = colours if len(set(colours)) == len(colours) else [*islice(cycle(ask.COLOURS), len(colours))]
     return dict(zip((case.configuration for case in cases), colours, strict=True))
 
 
@@ -646,9 +626,9 @@ def _front_panels(found: ComparisonResult) -> list[ask.Panel]:
     for task, cases in found.tasks.items():
         colours, marks, completed = _colours(cases), [], [case for case in cases if case.status.is_completed]
         for number, case in enumerate(completed):
-            colour, marker = colours[case.configuration], _MARKS[number % len(_MARKS)]
+            colour, marker = colours[case.configuration], "osD^vP"[number % 6]
             if case.rows:
-                gas, error = (case.rows[name][:_MAXIMUM_DOTS] for name in (_GAS, found.error))
+                gas, error = (case.rows[name][:1500] for name in (_GAS, found.error))
                 marks.append(ask.dots(gas, error, ".", "", colour, alpha=0.35, markersize=4, markeredgewidth=0))
             x, y = ([case.value(name)] for name in (_GAS, found.error))
             marks.append(ask.dots(x, y, marker, case.configuration, colour, markersize=8, markeredgecolor="white"))
@@ -671,9 +651,10 @@ def _change_panels(found: ComparisonResult) -> list[ask.Panel]:
             change = _relative(base.rows[metric], case.rows[metric]) if case is not base else np.zeros(0)
             if change.size == 0:
                 continue
-            colour, (low, high) = colours[case.configuration], np.percentile(change, _SHOWN_PERCENTILES)
+            # A few distant changes would squeeze all others into one bar.
+            colour, (low, high) = colours[case.configuration], np.percentile(change, (0.5, 99.5))
             # Fewer bins for fewer draws, so that each has some of them.
-            counts, edges = np.histogram(change, min(_BINS, max(8, round(1.5 * change.size**0.5))), (low, high))
+            counts, edges = np.histogram(change, min(40, max(8, round(1.5 * change.size**0.5))), (low, high))
             marks.append(ask.Mark("bars", edges, counts, label=case.configuration, colour=colour))
             nominal = _relative(*(np.array([side.value(metric)]) for side in (base, case)))
             dashed = {"linestyle": "--", "linewidth": 1.2}
@@ -703,7 +684,8 @@ def _limit_changes(ends: Sequence[float], axes: Any) -> None:
         axes.axvline(0.0, color=ask.BLACK, linewidth=0.8)
         low, high = min(low, 0.0), max(high, 0.0)
     axes.set_xlim(low - 0.08 * span, high + 0.08 * span)
-    axes.xaxis.set_major_locator(MaxNLocator(_TICKS_OF_CHANGE))
+    # Of more intervals, labels such as -98.85 would touch.
+    axes.xaxis.set_major_locator(MaxNLocator(4))
     axes.locator_params(axis="y", integer=True)
 
 
