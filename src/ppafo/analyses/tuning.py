@@ -35,20 +35,11 @@ MAXIMUM_DRAWS, NOISE_STREAMS, FRESH_DRAWS = 4096, 16, 1024
 draws outside the search, over which the tuned gains are evaluated."""
 INFEASIBLE, UNUSABLE = 1.0e6, 1.0e12
 """Lowest cost of a candidate that violates a constraint, and of one with a failed run, whose fraction is added."""
-_TOLERANCE, _REFINEMENTS, _SIMPLEX_SIZES = 1.0e-3, 60, (0.01, 0.1)
+_TOLERANCE, _REFINEMENTS = 1.0e-3, 60
 """Relative spread of the candidates' costs below which a start has converged; largest number of candidates of the
-simplex for each gain, and its smallest and largest initial size, as a fraction of the range."""
-_AT_BOUND, _AS_GOOD, _DIFFERENT = 0.01, 0.01, 0.1
-"""Fraction of the range from a bound that counts as at the bound, relative excess of an equally good cost, and fraction
-of the range above which two starts count as ended at different gains."""
+simplex for each gain."""
 _START_COLOURS = (ask.GREEN, ask.PURPLE, ask.ORANGE, ask.GREY)
 """Colours of the starts of a search; the gains before and after have other colours."""
-_BEYOND, _DECADE = 0.05, 10.0
-"""Fraction of the range by which gains outside the bounds are drawn beyond them; ratio of a logarithmic axis' ends."""
-_SEARCH_CAPTION = (
-    "Above: the best objective so far in each start. Below: where the gains lie between their bounds; a gain "
-    "before that is beyond a bound is drawn beside it."
-)
 Gains = Mapping[str, float]
 _Value = Annotated[str | float, Words("text with unit; a plain number if there is no unit", form=float)]
 _Metric = Annotated[str, Words("name of a metric, such as 'rms_error'")]
@@ -350,13 +341,23 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
                 scales[goal.metric] = ask.difference_of(goal.scale, goal.metric, where)
                 if scales[goal.metric] <= 0.0:
                     raise StudyError(f"{where}: must be above 0")
+        limits = list[ask.MetricLimit]()
+        for constraint in parsed.constraints:
+            metric, where = constraint.metric, f"constraint '{constraint.metric}'"
+            bounds = [text for text in (constraint.at_most, constraint.at_least) if text is not None]
+            if len(bounds) != 1:
+                has = "both" if bounds else "neither"
+                raise StudyError(f"{where}: has {has} of at_most and at_least; give one of them")
+            # Gauge pressures are refused where the atmosphere varies.
+            limit = ask.level_of(bounds[0], metric, f"{where} = '{bounds[0]}'", atmosphere)
+            limits.append(ask.MetricLimit(metric, limit, constraint.at_most is not None, bounds[0]))
         return Problem(
             name=parsed.name,
             description=" ".join(parsed.description.split()),
             scenario=scenario,
             searched=tuple(_searched(gain, scenario, atmosphere is None) for gain in parsed.search),
             goals=parsed.objective,
-            constraints=tuple(_metric_limit(constraint, atmosphere) for constraint in parsed.constraints),
+            constraints=tuple(limits),
             effort=parsed.effort,
             scales=scales,
             changes=ask.changes_in(scenario, overrides=overrides),
@@ -365,19 +366,6 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
             draws=(NOISE_STREAMS if robust is None else robust.draws) if uncertainty.drawn else 1,
             seed=seed,
         )
-
-
-def _metric_limit(constraint: Constraint, atmosphere: float | None) -> ask.MetricLimit:
-    """Return the limit of a constraint in SI; StudyError unless it has exactly one of at_most and at_least.
-
-    Gauge pressures are relative to ``atmosphere`` [Pa absolute], and refused if it is None because it varies.
-    """
-    bounds = [text for text in (constraint.at_most, constraint.at_least) if text is not None]
-    if len(bounds) != 1:
-        has = "both" if bounds else "neither"
-        raise StudyError(f"constraint '{constraint.metric}': has {has} of at_most and at_least; give one of them")
-    limit = ask.level_of(bounds[0], constraint.metric, f"constraint '{constraint.metric}' = '{bounds[0]}'", atmosphere)
-    return ask.MetricLimit(constraint.metric, limit, constraint.at_most is not None, bounds[0])
 
 
 def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) -> SearchedParameter:
@@ -472,8 +460,8 @@ def solve_tuning(
     bounds: dict[str, Literal["minimum", "maximum"]] = {}
     for gain in problem.searched:
         fraction = gain.range.fraction(after.gains[gain.place.path])
-        if not _AT_BOUND < fraction < 1.0 - _AT_BOUND:
-            bounds[gain.place.path] = "minimum" if fraction <= _AT_BOUND else "maximum"
+        if not 0.01 < fraction < 1.0 - 0.01:
+            bounds[gain.place.path] = "minimum" if fraction <= 0.01 else "maximum"
     tracking, lines = ask.verdict_of(after.result), problem.lines(after.gains)
     tuned = Tuned(
         tuning=problem.name,
@@ -489,10 +477,10 @@ def solve_tuning(
         after=after,
         starts=starts,
         runs=runs.count,
-        remarks=[],
+        remarks=_remarks(after, starts, bounds, runs.count, scenario.origin.replaced),
         problem=problem,
     )
-    return _finding(replace(tuned, remarks=_remarks(tuned)))
+    return _finding(tuned)
 
 
 def judge(rows: ask.Rows, problem: Problem, scales: Mapping[str, float]) -> ask.Rows:
@@ -564,7 +552,7 @@ def search(
         )
         generations = len(batches)
         # In a flat valley generations come to within a hundredth of the best, and hardly nearer.
-        size = np.clip(np.std(evolved.population, axis=0), *_SIMPLEX_SIZES)
+        size = np.clip(np.std(evolved.population, axis=0), 0.01, 0.1)
         corners = [evolved.x, *(evolved.x + np.diag(np.where(evolved.x + size > 1.0, -size, size)))]
         refined = minimize(
             lambda fractions: float(batch_costs(fractions[:, None])[0]),
@@ -610,7 +598,7 @@ def agreement(starts: Sequence[SearchStart]) -> float:
     best = starts[0]
     # Of an infeasible cost only what the violation adds is compared: a hundredth of the offset would take in all.
     scale = best.cost - INFEASIBLE if best.cost >= INFEASIBLE else best.cost
-    as_good = [start for start in starts if start.cost <= best.cost + _AS_GOOD * abs(scale)]
+    as_good = [start for start in starts if start.cost <= best.cost + 0.01 * abs(scale)]
     return max(float(np.max(np.abs(np.subtract(start.fractions, best.fractions)))) for start in as_good)
 
 
@@ -651,20 +639,21 @@ def _verdict(problem: Problem, before: GainResult, after: GainResult, useless: s
     return f"objective {before.objective:.4g} before, {after.objective:.4g} after{percent}"
 
 
-def _remarks(tuned: Tuned) -> list[str]:
+def _remarks(
+    after: GainResult, starts: Sequence[SearchStart], bounds: Mapping[str, str], runs: int, kept: str
+) -> list[str]:
     """Return remarks on convergence, bounds that were reached, ambiguous gains, draws, and a loop that swings."""
-    after, starts = tuned.after, tuned.starts
     remarks = [
         f"{count_of(len(starts), 'start')}, {sum(start.candidates for start in starts):,} "
-        f"candidates, {tuned.runs:,} runs; {sum(start.is_settled for start in starts)} of {len(starts)} converged "
+        f"candidates, {runs:,} runs; {sum(start.is_settled for start in starts)} of {len(starts)} converged "
         "before the maximum number of generations",
-        tuned.problem.scenario.origin.replaced,
+        kept,
     ]
     remarks += [
         f"{path} ended at its {bound}: a better value may lie beyond; widen the bounds if the device allows it"
-        for path, bound in tuned.bounds_reached.items()
+        for path, bound in bounds.items()
     ]
-    if (difference := agreement(starts)) > _DIFFERENT:
+    if (difference := agreement(starts)) > 0.1:
         remarks.append(
             f"starts whose objectives agree within 1 % differ by up to {100.0 * difference:.0f} % of the range between "
             "the bounds: the objective does not determine the gains uniquely"
@@ -731,7 +720,7 @@ def _finding(tuned: Tuned) -> ask.Finding[Tuned]:
                 remarks=tuned.remarks,
                 panels=partial(_search_panels, tuned),
                 name="search",
-                caption=_SEARCH_CAPTION,
+                caption="Below: a gain before that is beyond a bound is drawn beside it.",
                 size=(5.4, max(2.2, 0.9 + 0.3 * len(problem.searched))),
             ),
             ask.Section("To use the gains", code=used),
@@ -784,12 +773,12 @@ def _search_panels(tuned: Tuned) -> list[ask.Panel]:
     def scale(axes: Any) -> None:
         axes.locator_params(axis="x", integer=True)
         # Below a decade a logarithmic axis has no tick that reads as a number.
-        if axes.dataLim.ymax > _DECADE * axes.dataLim.ymin > 0.0:
+        if axes.dataLim.ymax > 10.0 * axes.dataLim.ymin > 0.0:
             axes.set_yscale("log")
 
     rows = np.arange(len(searched))[::-1]
     ends = np.array([start.fractions for start in starts]).ravel()
-    previous = np.clip([gain.range.fraction(gain.before) for gain in searched], -_BEYOND, 1.0 + _BEYOND)
+    previous = np.clip([gain.range.fraction(gain.before) for gain in searched], -0.05, 1.05)
     found = [gain.range.fraction(tuned.after.gains[gain.place.path]) for gain in searched]
     marks = (
         *(ask.Mark("line", [0.0, 1.0], [row, row], colour=ask.GREY, style={"linewidth": 1.0}) for row in rows),
