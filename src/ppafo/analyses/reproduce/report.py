@@ -293,17 +293,30 @@ def _enlarge(frame: tuple[float, float, float, float], ends: tuple[float, float]
 def _torque_task_panels(reproduction: Reproduction) -> list[Panel]:
     """Return figure 8: torque and reference with each valve, valve commands below, error and gas at the bottom.
 
-    Beside the gas stands what the paper states, beside the torque that of the simulated bench.
+    Beside the gas stands what the paper states, beside the torque that of the simulated bench. Gas that leaks past the
+    vane is vented from the other chamber.
     """
     valves = {"solenoid": style.SOLENOID, "proportional": style.PROPORTIONAL}
     runs = {valve: getattr(reproduction, valve).recording for valve in valves}
     stated = {claim.entry.id: claim.entry.published or 0.0 for claim in reproduction.claims}
     in_paper = {valve: stated[f"co2_{valve}"] for valve in valves}
     ceiling, dashed = holding_torque(reproduction.solenoid), {"linestyle": style.REFERENCE.line, "linewidth": 1.3}
+
+    def bar(ends: tuple[float, float], middle: float, half: float, colour: str, alpha: float, label: str = "") -> Mark:
+        edges = (middle - half,) * 2, (middle + half,) * 2
+        return Mark("band", ends, edges, label=label, colour=colour, style={"alpha": alpha})
+
     torques, gas = list[list[Mark]](), list[Mark]()
     errors = [Mark("level", y=0.0, colour=style.GREY, style={"linewidth": 0.8})]
-    for valve, run in runs.items():
-        colour, supplied = valves[valve].colour, run["supplied_mass"]
+    # Grey in the legend, as the bars have the colours of the valves.
+    places = [
+        bar((0.0, 0.0), 0.0, 0.0, style.GREY, 1.0, "in chambers"),
+        bar((0.0, 0.0), 0.0, 0.0, style.GREY, 0.35, "vented"),
+        bar((0.0, 0.0), 0.0, 0.0, style.BLACK, 1.0, "leaked (part of vented)"),
+    ]
+    for (valve, run), height in zip(runs.items(), (1.0, 0.0), strict=True):
+        colour = valves[valve].colour
+        supplied, vented, leaked = (float(run[name][-1]) for name in ("supplied_mass", "vented_mass", "leaked_mass"))
         marks = [
             Mark("line", run.time, run["reference"], label="reference", colour=style.REFERENCE.colour, style=dashed),
             Mark("level", y=ceiling, label=f"maximum: {ceiling:.1f} N m", colour=style.GREY, style=_LEVEL),
@@ -317,9 +330,17 @@ def _torque_task_panels(reproduction: Reproduction) -> list[Panel]:
             )
         torques.append([*marks, Mark("line", run.time, run["torque"], label="simulated", colour=colour)])
         errors.append(Mark("line", run.time, run["reference"] - run["torque"], colour=colour))
-        label = f"{valve}: {GRAMS_PER_KILOGRAM * supplied[-1]:.2f} g, in the paper {in_paper[valve]:g} g"
-        gas.append(Mark("line", run.time, supplied, label=label, colour=colour))
+        label = f"{valve}: {GRAMS_PER_KILOGRAM * supplied:.2f} g, in the paper {in_paper[valve]:g} g"
+        gas.append(Mark("line", run.time, run["supplied_mass"], label=label, colour=colour))
         gas.append(Mark("level", y=in_paper[valve] / GRAMS_PER_KILOGRAM, colour=colour, style=_LEVEL))
+        inside = supplied - vented
+        label = f"   {GRAMS_PER_KILOGRAM * inside:.2f} + {GRAMS_PER_KILOGRAM * vented:.2f} g"
+        places += [
+            Mark("text", supplied, height, label=label, colour=style.BLACK, style={"fontsize": 8.5, "va": "center"}),
+            bar((0.0, inside), height, 0.25, colour, 1.0),
+            bar((inside, supplied), height, 0.25, colour, 0.35),
+            bar((supplied - leaked, supplied), height - 0.36, 0.05, style.BLACK, 1.0),
+        ]
     solenoid, proportional = runs.values()
     most = GRAMS_PER_KILOGRAM * max(float(run["supplied_mass"][-1]) for run in runs.values())
     limits = partial(methodcaller, "set", xlim=(float(solenoid.time[0]), float(solenoid.time[-1])))
@@ -338,6 +359,8 @@ def _torque_task_panels(reproduction: Reproduction) -> list[Panel]:
         filled = {"where": is_on | np.concatenate(([False], is_on[:-1])), "alpha": 1.0}
         edges = np.full((2, is_on.size), [[row + 0.12], [row + 0.88]])
         filling.append(Mark("band", solenoid.time, edges, colour=look.colour, style=filled))
+    # To the right of the longer bar there is space for the amounts.
+    places_limits = methodcaller("set", xlim=(0.0, 1.8 * most), yticks=(1.0, 0.0), yticklabels=tuple(valves))
     panel = partial(Panel, TIME, shares_x=True)
     command_panel = partial(panel, Kind(), legend="", tall=0.7)
     return [
@@ -347,38 +370,5 @@ def _torque_task_panels(reproduction: Reproduction) -> list[Panel]:
         command_panel([opening], "Opening of the proportional valve", then=opening_limits),
         panel(_ERROR, errors, "Error: reference less torque, both valves", legend="", tall=1.3, then=limits()),
         panel(_GAS, gas, "CO$_2$ from the supply (dotted: the paper)", tall=1.3, then=gas_limits),
-        _gas_panel(solenoid, proportional, most),
+        Panel(_GAS, Kind(), places, "Location of this gas at the end", then=places_limits, tall=0.75),
     ]
-
-
-def _gas_panel(solenoid: Recording, proportional: Recording, most: float) -> Panel:
-    """Return the panel of the supplied gas at the end [kg]: bars in the chambers and vented, and below them leaked.
-
-    Gas that leaks past the vane is vented from the other chamber. ``most`` is the larger supplied gas [g].
-    """
-
-    def bar(ends: tuple[float, float], middle: float, half: float, colour: str, alpha: float, label: str = "") -> Mark:
-        edges = (middle - half,) * 2, (middle + half,) * 2
-        return Mark("band", ends, edges, label=label, colour=colour, style={"alpha": alpha})
-
-    none = (0.0, 0.0)
-    # Grey in the legend, as the bars have the colours of the valves.
-    marks = [
-        bar(none, 0.0, 0.0, style.GREY, 1.0, "in chambers"),
-        bar(none, 0.0, 0.0, style.GREY, 0.35, "vented"),
-        bar(none, 0.0, 0.0, style.BLACK, 1.0, "leaked (part of vented)"),
-    ]
-    for run, colour, height in ((solenoid, style.SOLENOID.colour, 1.0), (proportional, style.PROPORTIONAL.colour, 0.0)):
-        supplied, vented, leaked = (float(run[name][-1]) for name in ("supplied_mass", "vented_mass", "leaked_mass"))
-        inside = supplied - vented
-        label = f"   {GRAMS_PER_KILOGRAM * inside:.2f} + {GRAMS_PER_KILOGRAM * vented:.2f} g"
-        marks += [
-            Mark("text", supplied, height, label=label, colour=style.BLACK, style={"fontsize": 8.5, "va": "center"}),
-            bar((0.0, inside), height, 0.25, colour, 1.0),
-            bar((inside, supplied), height, 0.25, colour, 0.35),
-            bar((supplied - leaked, supplied), height - 0.36, 0.05, style.BLACK, 1.0),
-        ]
-    # To the right of the longer bar there is space for the amounts.
-    ticks = {"yticks": (1.0, 0.0), "yticklabels": ("solenoid", "proportional")}
-    set_limits = methodcaller("set", xlim=(0.0, 1.8 * most), **ticks)
-    return Panel(_GAS, Kind(), marks, "Location of this gas at the end", then=set_limits, tall=0.75)
