@@ -455,6 +455,17 @@ def test_noise_that_turns_the_command_before_the_judged_half_of_a_hold_is_not_co
     assert task_parts(scenario, recording.with_channel("command", command, "-"))[0].command_reversal_rate > 30.0
 
 
+def test_noise_that_varies_counts_in_each_run_as_in_a_run_of_its_own() -> None:
+    task = load_scenario(TASK, [LEVEL, "sensors.pressure_noise=1 kPa_d"])
+    noises = np.array([100.0, 20_000.0])
+    rows, *alone = (
+        run_judged(task, ["rms_error"], (), 1, {"sensors.pressure_noise": each})
+        for each in (noises, noises[:1], noises[1:])
+    )
+    assert rows["excess"].tolist() == [row["excess"][0] for row in alone]
+    assert rows["turning"].tolist() == [False, True]
+
+
 PULSES = {"kind": "smooth", "level": "0 N m", "period": "1.25 s", "value_01": "0 N m", "value_02": "3 N m"}
 PULSES |= {f"time_{number:02}": f"{time} s" for number, time in enumerate((0.3, 0.6, 0.9, 1.15), 2)}
 PULSED = ["controller.kind=pid", *(f"reference.{name}={text}" for name, text in PULSES.items()), "run.duration=8 s"]

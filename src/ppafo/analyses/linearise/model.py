@@ -584,9 +584,17 @@ def _steady(
     for start in starts:
         # Least squares instead of a solver that refuses: in a dead band the slopes are singular.
         first = np.clip([start[name] for name in names], least, most)
-        found = least_squares(
-            partial(imbalance, start), first, bounds=(least, most), x_scale=sizes, ftol=None, gtol=None, xtol=1.0e-15
-        )
+        # A search that fails, as of a valve without area, says so by its sum.
+        with np.errstate(all="ignore"):
+            found = least_squares(
+                partial(imbalance, start),
+                first,
+                bounds=(least, most),
+                x_scale=sizes,
+                ftol=None,
+                gtol=None,
+                xtol=1.0e-15,
+            )
         if np.max(np.abs(found.fun)) < _STEADY:
             return {**start, **dict(zip(names, found.x.tolist(), strict=True))}
     return None

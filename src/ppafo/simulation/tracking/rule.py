@@ -132,10 +132,13 @@ def only_switches(scenario: Scenario, law: ControllerKind | None) -> bool:
     return is_pair(scenario) or (law is not None and law.only_switches)
 
 
-def is_noisy(scenario: Scenario) -> bool:
-    """True if sensor noise reverses the command of a task; reversals then count in its settled part only."""
-    sensors = scenario.sensors
-    return scenario.follows_reference and bool(sensors.angle_noise or sensors.pressure_noise)
+def is_noisy(scenario: Scenario) -> Any:
+    """True, for each run if the noise varies (runs,), if sensor noise reverses the command of a task.
+
+    Reversals then count in its settled part only.
+    """
+    noise = np.maximum(scenario.sensors.angle_noise, scenario.sensors.pressure_noise)
+    return np.logical_and(scenario.follows_reference, noise > 0.0)
 
 
 def excess_of_walk(settled: SettledPart, turning: Floats | float, limit: Floats | float) -> Any:
@@ -311,10 +314,11 @@ def command_turning(scenario: Scenario, metrics: Mapping[str, Floats], most_reve
     ``tracking_excess``.
     """
     none = np.zeros(next(iter(metrics.values())).size)
-    if not is_noisy(scenario) or "settled_reversals" not in metrics:
-        return np.nan_to_num(metrics.get(REVERSALS, none)) / most_reversals
+    turning = np.nan_to_num(metrics.get(REVERSALS, none)) / most_reversals
+    if "settled_reversals" not in metrics:
+        return turning
     often = most_reversals / max(float(first(scenario.run.duration)), 1.0)
-    return np.nan_to_num(metrics["settled_reversals"]) / often
+    return np.where(is_noisy(scenario), np.nan_to_num(metrics["settled_reversals"]) / often, turning)
 
 
 class TrackingExcess(NamedTuple):
