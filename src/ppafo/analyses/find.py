@@ -194,12 +194,14 @@ def _range(text: str, base: Scenario) -> tuple[ask.VariedPath, float, float]:
     if parts is None:
         raise StudyError(f"{quoted} is not of the form PATH=LOW..HIGH, for example 'supply.pressure=20..90 psi_g'")
     name, lower, upper = parts.groups()
-    # As in '20..90 psi_g': the low end has the unit of the high one unless it says its own.
-    if not ask.split_quantity(lower)[1]:
-        lower = f"{lower} {ask.split_quantity(upper)[1]}".rstrip()
     with refused_as(StudyError, quoted, ScenarioError, UnitError):
         path = ask.varied_path(name, base, [upper])
-        low, high = ask.distribution_in({"kind": "uniform", "minimum": lower, "maximum": upper}, path).numbers
+        # As in '20..90 psi_g': the low end has the unit of the high one unless it says its own.
+        if not ask.split_quantity(lower)[1]:
+            lower = f"{lower} {ask.split_quantity(upper)[1]}".rstrip()
+        low, high = path.level(lower), path.level(upper)
+    if low >= high:
+        raise StudyError(f"{quoted}: the lower end must be below the upper end")
     return path, low, high
 
 

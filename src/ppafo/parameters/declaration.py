@@ -155,7 +155,9 @@ def range_rule(quantity: Quantity, given: str = "") -> str:
     # The limits of a pressure are absolute; in gauge they would move with the atmosphere.
     unit = f"{split_pressure_kind(unit)[0]}_a" if quantity.unit == "Pa_a" else "" if unit == "1" else unit
     beyond = "at least" if quantity.minimum_allowed else "more than"
-    ends = ((beyond, quantity.minimum), ("at most", quantity.maximum))
+    # A limit that is not allowed itself is declared as the last number before it.
+    is_allowed = math.nextafter(quantity.maximum, math.inf) != 1.0
+    ends = ((beyond, quantity.minimum), ("at most" if is_allowed else "below", quantity.maximum))
     limits = (
         f"{word} {from_si(end, unit, quantity.unit):.6g} {unit}".rstrip() for word, end in ends if math.isfinite(end)
     )

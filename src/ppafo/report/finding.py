@@ -100,9 +100,9 @@ class Section:
     facts. ``marked`` are the indices of highlighted rows, from 0. ``remarks`` are printed below the table.
 
     Figure: ``name`` is the stem of its files, empty without a figure. It is drawn from ``panels``, or from a function
-    that returns panels on demand, with ``across`` panels per row, a panel ``size`` [inches], a ``title`` and a
-    ``note``. Alternatively ``draw`` returns the complete figure. ``caption`` is
-    printed on the page.
+    that returns panels on demand, with ``across`` panels per row, a panel ``size`` [inches], a ``title``, a ``note``
+    and the ``kind`` of its numbers, that of the report by default. Alternatively ``draw`` returns the complete figure.
+    ``caption`` is printed on the page.
 
     ``code`` is a text to be copied. A section with ``is_detail`` is on the page only.
     """
@@ -118,6 +118,7 @@ class Section:
     size: tuple[float, float] = (5.2, 2.6)
     title: str = ""
     note: str = ""
+    kind: RecordingKind | None = None
     code: str = ""
     left: int = 1
     marked: Collection[int] = ()
@@ -155,7 +156,7 @@ class Section:
         if self.draw is not None:
             return self.draw()
         panels = self.panels() if callable(self.panels) else self.panels
-        return draw_panels(panels, self.across, self.size, self.title, self.note, kind)
+        return draw_panels(panels, self.across, self.size, self.title, self.note, self.kind or kind)
 
 
 _in_own_units = in_units(lambda finding, *_, **__: finding.units)

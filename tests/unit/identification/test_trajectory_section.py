@@ -336,6 +336,7 @@ pressure_2 = { column = 4, unit = "Pa_a" }
         ),
         (f"{FIT}{SLOW}interval = '0 s'\n", "interval = '0 s': must be at least 1e-06 s"),
         (f"{FIT}{SLOW}interval = '9 s'\n", "candidate 'slow': interval = 9 s must be at most"),
+        (f"{FIT}{SLOW.replace('slow', 'step')}", "candidate 'step': another experiment or candidate has this label"),
         (FIT.replace("50 g m^2", "2 g m^2"), "foot_plate.inertia: low = 0.002 must be below high = 0.002"),
         (FIT.replace(PARAMETERS, "parameters = []"), "problem.toml: line 5: trajectory.parameters"),
         (f"[trajectory]\nexperiments = []\n{PARAMETERS}", "problem.toml: line 5: trajectory.experiments"),

@@ -146,7 +146,9 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
         cells = [(name, *(f"{less:.0f} %" for less in lesses)) for name, *lesses in rows]
         parts.append(Section(columns=columns_of(head, cells), remarks=("", *result_on_u(rows))))
     step, task = partial(_step_panels, reproduction), partial(_torque_task_panels, reproduction)
-    parts.append(Section(name=STEP_FIGURE, panels=step, across=2, size=(3.15, 1.0), is_detail=True))
+    # Its grey curves are a synthetic measurement, so that the figure is marked as synthetic.
+    origin = None if isinstance(synthetic, str) else synthetic.step.kind
+    parts.append(Section(name=STEP_FIGURE, panels=step, across=2, size=(3.15, 1.0), kind=origin, is_detail=True))
     parts.append(Section(name=TORQUE_FIGURE, panels=task, size=(6.3, 1.0), is_detail=True))
     if not isinstance(synthetic, str):
         draw = partial(figure_3, synthetic.torque, synthetic.decay)

@@ -446,7 +446,7 @@ def _fit_of(problem: TrajectoryProblem, numbers: tuple[FitNumber, ...], report: 
     for experiment in problem.experiments:
         reach = reach_of([number for number in numbers if number.acts_in(experiment.label)])
         runs.append(prepare(experiment, numbers_in(experiment.label, numbers, start), reach))
-    report(Progress(f"trajectory fit: {len(numbers)} numbers, {len(runs)} recordings"))
+    report(Progress(f"trajectory fit: {count_of(len(numbers), 'number')}, {count_of(len(runs), 'recording')}"))
     # The error of the integration is nearly proportional to the tolerance, so that finer runs show most of it. It is no
     # independent noise: all samples of a recording share it.
     finer = []
@@ -677,6 +677,8 @@ def solve_section(
                 raise IdentificationError(
                     f"candidate '{one.label}': interval = {one.interval:g} s must be at most {longest:g} s"
                 )
+            if one.label in (*(each.label for each in problem.experiments), *(each.label for each in candidates)):
+                raise IdentificationError(f"candidate '{one.label}': another experiment or candidate has this label")
             candidates.append(CandidateExperiment(one.label, scenario, one.noise.by_channel(), one.interval))
         fitted = fit(problem, report)
         expected = expected_information(fitted, candidates)

@@ -46,8 +46,8 @@ def check_command(recording: Recording, file: str) -> None:
     worst = int(np.argmax(np.abs(command)))
     if abs(command[worst]) > 1.0 + _COMMAND_TOLERANCE:
         raise DataError(
-            f"{file}: '{COMMAND}' is {command[worst]:.6g} at {recording.time[worst]:.6g} s (sample {worst + 1}); it "
-            "must be from -1 to 1, the fraction of full opening"
+            f"{file}: '{COMMAND}' is {command[worst]:.6g} in sample {worst + 1}; it must be from -1 to 1, the fraction "
+            "of full opening"
         )
 
 
