@@ -585,7 +585,7 @@ def _panels(found: Influences) -> list[ask.Panel]:
         colours = [ask.COLOURS[rank] if rank < _MAXIMUM_LINES else ask.GREY for rank in range(order.size)]
         places = np.arange(order.size)[::-1]
         for (index, values), filled, shift in zip(
-            indices.values.items(), ("full", "none"), (0.14, -0.14), strict=False
+            indices.values.items(), ("full", "none"), (0.14, -0.14) if len(indices.values) > 1 else (0.0,), strict=False
         ):
             for row, colour, place in zip(order, colours, places, strict=True):
                 style = {"markersize": 5, "elinewidth": 1.4, "fillstyle": filled, "fmt": ask.MARKERS.get(colour, "o")}

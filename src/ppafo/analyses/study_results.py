@@ -508,7 +508,7 @@ def _histogram(by_name: ask.Rows, kind: ask.Kind) -> ask.Panel:
     values = np.concatenate(list(known.values()))
     if not values.size:
         return ask.Panel(kind, ask.Kind(), (), then=methodcaller("set", yticks=[]))
-    low, high, ticks = float(values.min()), float(values.max()), {}
+    low, high, ticks = float(values.min()), float(values.max()), dict[str, ask.Floats]()
     if high == low:
         # One bar about the only value.
         edges, ticks = low + (abs(low) or 1.0) * np.array([-0.05, 0.05]), {"xticks": kind.values(np.array([low]))}
@@ -521,7 +521,13 @@ def _histogram(by_name: ask.Rows, kind: ask.Kind) -> ask.Panel:
         ask.Mark("bars", edges, np.histogram(own, edges)[0], label=name, colour=colour)
         for (name, own), colour in zip(known.items(), COLOURS, strict=False)
     ]
-    return ask.Panel(kind, ask.Kind(), marks, then=methodcaller("set", yticks=[], **ticks))
+
+    def set_ticks(axes: Axes) -> None:
+        # Few enough for labels of many digits, such as 0.00025.
+        axes.locator_params(axis="x", nbins=5)
+        axes.set(yticks=[], **ticks)
+
+    return ask.Panel(kind, ask.Kind(), marks, then=set_ticks)
 
 
 def _map(

@@ -174,6 +174,11 @@ class Problem:
         return f"Tuning '{self.name}' of '{self.scenario.name}': {', '.join(self.before)}"
 
     @property
+    def overrides(self) -> tuple[str, ...]:
+        """Overrides of the tuned scenario, to be given before those of the gains."""
+        return self.scenario.origin.overrides
+
+    @property
     def is_worse_high(self) -> dict[str, bool]:
         """Metrics of the goals and constraints: True if a larger value is worse, by the goal if in both."""
         worse = {goal.metric: goal.weight > 0.0 for goal in self.goals}

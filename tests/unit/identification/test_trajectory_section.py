@@ -212,7 +212,7 @@ def test_the_fit_starts_from_what_the_bench_found_and_keeps_the_rest_of_it(solve
         assert held[path].before_error == pytest.approx(half / 1.96, rel=5e-3)
     started = solve(f"{STATIC}{FIT}[[trajectory.parameters]]\npath = 'friction.static_torque'\n").trajectory
     assert started is not None
-    friction = next(one for one in started.numbers if one.path == "friction.static_torque")
+    friction = next(one for one in started.fit.numbers if one.path == "friction.static_torque")
     known = static["friction.static_torque"]
     assert friction.start == pytest.approx(known.value, abs=5e-3 * known.wider_half_width)
 
@@ -440,7 +440,7 @@ def test_a_contradiction_about_the_vane_is_told(solve: Solve, laboratory: Path, 
         solve(f"{ONE_NUMBER}{text}")
 
 
-@pytest.mark.parametrize("prior", ['prior = "bench"', 'start = "25 g m^2/s"'])
+@pytest.mark.parametrize("prior", ['prior = "bench"', 'start = "0.025 N m s/rad"'])
 @pytest.mark.parametrize("name", ["decay.csv", "copied.csv"])
 def test_a_recording_of_a_bench_procedure_that_is_fitted_too_is_refused(
     solve: Solve, laboratory: Path, prior: str, name: str
