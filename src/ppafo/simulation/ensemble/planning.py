@@ -194,6 +194,8 @@ class EnsemblePlan:
     reasons: dict[int, str]
 
 
+# A valve without area takes for ever to fill a chamber, which is no fault of a plan.
+@np.errstate(divide="ignore", invalid="ignore")
 def plan_ensemble(columns: ScenarioColumns, change: Callable[[Run], Run] | None = None) -> EnsemblePlan:
     """Batches of all valid runs; rows are bit for bit as from ``plan_run`` for one run, with ``change`` applied."""
     valid = screen_columns(columns)
