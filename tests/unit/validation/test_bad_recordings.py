@@ -53,7 +53,7 @@ def written(folder: Path, *lines: str) -> Path:
         ),
         ([HEADER, ROWS[0]], ["has 1 sample;"]),
         ([HEADER, *ROWS[:20], *(f"9{row}" for row in ROWS[20:])], ["gap of 90 s after 0.019 s (sample 20)"]),
-        ([HEADER, *(row.replace(",1,", ",12,") for row in ROWS)], ["'command' is 12 at 0 s (sample 1)"]),
+        ([HEADER, *(row.replace(",1,", ",12,") for row in ROWS)], ["'command' is 12 in sample 1"]),
         (
             [HEADER, *(ROWS[0].replace("0.000", f"{0.001 * n:.3f}") for n in range(60))],
             ["which is too little to test a model"],

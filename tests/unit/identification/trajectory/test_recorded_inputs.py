@@ -154,7 +154,7 @@ def test_a_supply_that_is_followed_cannot_be_fitted_too(experiment: FittedExperi
 @pytest.mark.parametrize(
     ("name", "values", "unit", "message"),
     [
-        ("command", 1.5, "-", "'command' is 1.5 at 0 s .sample 1.; it must be from -1 to 1"),
+        ("command", 1.5, "-", "'command' is 1.5 in sample 1; it must be from -1 to 1"),
         ("supply_pressure", 2.0e4, "Pa", "far below atmospheric pressure"),
     ],
 )
