@@ -26,7 +26,7 @@ class Quantity:
     minimum_allowed: bool = True
     """False if the value must be above ``minimum``."""
     follows: "PlainFunction | str" = ""
-    """What is added to the default: a rule of a loop in ``control``, or the name of a number that a law believes."""
+    """Source of the default: a rule of a loop in ``control``, or the name of a number that a law believes."""
     words: tuple[str, ...] = ()
     """Words that a file may have in place of the number."""
     optional: bool = False

@@ -375,8 +375,11 @@ def _table_schema(
         described["minProperties"] = int(table.required)
     else:
         inner = {name: _joined(path, name) for name in layout_of(fields).names.get(path, ())}
+        # The name of a kind has the meaning of the kind, where a catalogue has it.
+        known = kind.allowed if isinstance(kind, Words) else ()
+        summary = getattr(known[chosen], "summary", "") if isinstance(known, Mapping) and chosen else ""
         described["properties"] = {
-            name: _described({"const": chosen}, kind.allowed)
+            name: {"const": chosen} | ({"description": summary} if summary else {})
             if name == KIND and isinstance(kind, Words)
             else _schema(fields.get(at, InnerTable()), declare, document, at, definitions)
             for name, at in inner.items()
@@ -397,12 +400,6 @@ def _table_schema(
         name, wanted = (wanted, "") if wanted not in definitions else ("", f"{wanted}'")
     definitions[name] = described
     return {"$ref": f"#/$defs/{name}"}
-
-
-def _described(form: dict[str, Any], kinds: Iterable[Any]) -> dict[str, Any]:
-    """Return the schema of the name of a kind with the meaning of the kind, where a catalogue has it."""
-    summary = getattr(kinds[form["const"]], "summary", "") if isinstance(kinds, Mapping) and form["const"] else ""
-    return form | ({"description": summary} if summary else {})
 
 
 def _with(document: Mapping[str, Any], path: str, value: Any) -> dict[str, Any]:

@@ -46,7 +46,7 @@ from ppafo.version import __version__
 from ppafo.walking.bottle.coupling import Schedule
 
 Limit = Literal["torque", "flow", "control", "pressure"]
-"""What a valve needs for less pressure: more torque, a larger opening, a loop that follows, a lower pressure.lowest."""
+"""Limit of a valve's pressure, which falls with more torque, a larger opening, a loop that follows, pressure.lowest."""
 PRESSURE = Kind("Supply pressure", "Pa_a", "pressure", ".3g")
 TORQUE = Kind("Torque", "N m", "torque", ".3g")
 ERROR, GAS = "rms_error", "gas_supplied"

@@ -332,17 +332,17 @@ def arithmetic_claims(reported: ParameterSet) -> list[Claim]:
 # Statements of the text on the recordings.
 
 
-def _told(identifier: str, holds: bool | np.bool, evidence: str, reservation: str = "") -> Claim:
+def _observed(identifier: str, holds: bool | np.bool, evidence: str, reservation: str = "") -> Claim:
     """Return the verdict of a simulation on a statement of the text; a reservation is what the text does not tell."""
     verdict: Verdict = "met_by_fitted_settings" if holds else "undetermined"
     return Claim(paper_entries()[identifier], verdict, note=reservation, found=evidence)
 
 
-def _claim_on_text(identifier: str, told: Sequence[Claim], assumptions: tuple[str, ...]) -> Claim:
+def _claim_on_text(identifier: str, observed: Sequence[Claim], assumptions: tuple[str, ...]) -> Claim:
     """Return a claim that summarises the paper's statements on a recording."""
-    missing = [claim.entry.id for claim in told if claim.verdict == "undetermined"]
-    reserved = [claim for claim in told if claim.verdict != "undetermined" and claim.note]
-    plain = len(told) - len(missing) - len(reserved)
+    missing = [claim.entry.id for claim in observed if claim.verdict == "undetermined"]
+    reserved = [claim for claim in observed if claim.verdict != "undetermined" and claim.note]
+    plain = len(observed) - len(missing) - len(reserved)
     notes = [f"Not shown: {', '.join(missing)}."] if missing else []
     notes += [f"With a reservation: {claim.entry.id}, {claim.note}." for claim in reserved]
     return Claim(
@@ -382,8 +382,8 @@ def step_observations(recording: Recording, supply: Supply) -> list[Claim]:
     entries, events = paper_entries(), step_events(recording)
     if events is None:
         statements = (name for name, entry in entries.items() if entry.computation == "figure_7")
-        return [_told(name, False, "the vane does not move from rest to rest") for name in statements]
-    (start, stop), told = events, list[Claim]()
+        return [_observed(name, False, "the vane does not move from rest to rest") for name in statements]
+    (start, stop), observed = events, list[Claim]()
     # Gauge pressures [psi], and times [ms].
     time, angle, atmosphere = 1e3 * recording.time, np.degrees(recording["angle"]), supply.atmospheric_pressure
     first, second = ((recording[f"pressure_{chamber}"] - atmosphere) / PASCALS_PER_PSI for chamber in (1, 2))
@@ -396,7 +396,7 @@ def step_observations(recording: Recording, supply: Supply) -> list[Claim]:
     ends = [entries[name].published or 0.0 for name in ("smallest_angle", "largest_angle")]
     turns = abs(angle[0] - ends[0]) < _SAME_ANGLE and abs(angle[-1] - ends[1]) < _SAME_ANGLE
     evidence = f"from {angle[0]:.1f} to {angle[-1]:.1f} deg in {time[stop] - time[start]:.0f} ms"
-    told.append(_told("vane_turns_through_its_range", turns, evidence))
+    observed.append(_observed("vane_turns_through_its_range", turns, evidence))
 
     before = first[: start + 1]
     torque = f", at a torque of {recording['torque'][start]:.2f} N m" if "torque" in recording else ""
@@ -410,7 +410,7 @@ def step_observations(recording: Recording, supply: Supply) -> list[Claim]:
     )
     early += "so the falling pressure in chamber 2 starts the vane"
     rises = only_rises(before) and before[-1] - before[0] > clear
-    told.append(_told("pressure_1_rises_until_breakaway", rises, evidence, early if waits else ""))
+    observed.append(_observed("pressure_1_rises_until_breakaway", rises, evidence, early if waits else ""))
 
     # From the peak near breakaway to the minimum: chamber 1 still fills while the vane sets off.
     gone = np.abs(angle - angle[0]) > _SETS_OFF * np.abs(angle[-1] - angle[0])
@@ -422,15 +422,15 @@ def step_observations(recording: Recording, supply: Supply) -> list[Claim]:
     beyond = (text for rise, text in ((further, rises_on), (again, rises_again)) if rise >= same)
     evidence = f"from {first[peak]:.1f} psig down to {first[lowest]:.1f} psig at {time[lowest]:.0f} ms"
     falls = first[peak] - first[lowest] > clear
-    told.append(_told("pressure_1_falls_in_motion", falls, evidence, ", and ".join(beyond)))
+    observed.append(_observed("pressure_1_falls_in_motion", falls, evidence, ", and ".join(beyond)))
 
     evidence = f"from {first[stop]:.1f} psig at the stop ({time[stop]:.0f} ms) to {first[-1]:.1f} psig; "
     fills = only_rises(first[stop:]) and abs(first[-1] - top) < same
-    told.append(_told("pressure_1_goes_to_supply", fills, f"{evidence}the supply is {top:.1f} psig"))
+    observed.append(_observed("pressure_1_goes_to_supply", fills, f"{evidence}the supply is {top:.1f} psig"))
 
     falls = abs(second[0] - top) < same and np.all(np.diff(second[: start + 1]) < 0.0)
     evidence = f"from {second[0]:.1f} to {second[start]:.1f} psig until breakaway"
-    told.append(_told("pressure_2_falls_from_supply", falls, evidence))
+    observed.append(_observed("pressure_2_falls_from_supply", falls, evidence))
 
     # Gas that only vents would fall at an ever slower rate; gas that is strongly compressed would rise. The rate is of
     # falling [psi/ms], so that a rise is negative and slower than any fall.
@@ -442,15 +442,15 @@ def step_observations(recording: Recording, supply: Supply) -> list[Claim]:
     evidence = f"falls by {fast:.2f} psi/ms at first, {'rises' if least < 0.0 else 'falls'} by {abs(least):.2f} psi/ms "
     evidence += f"at {time[slowest]:.0f} ms, falls by up to {later:.1f} psi/ms later"
     instead = f"instead of only falling more slowly it rises by {rise:.1f} psi" if rise >= same else ""
-    told.append(_told("pressure_2_slows_in_motion", slows, evidence, instead))
+    observed.append(_observed("pressure_2_slows_in_motion", slows, evidence, instead))
 
     empties, evidence = abs(second[-1]) < same, f"{second[-1]:.2f} psig at the end"
-    told.append(_told("pressure_2_goes_to_atmosphere", empties, evidence))
+    observed.append(_observed("pressure_2_goes_to_atmosphere", empties, evidence))
 
     # From full pressure one way to full pressure the other way: the range twice.
     begins, ended = first[0] - second[0], first[-1] - second[-1]
     builds_up, evidence = abs(ended - begins - 2.0 * top) < 2.0 * same, f"from {begins:.1f} to {ended:.1f} psi"
-    return [*told, _told("difference_builds_up", builds_up, evidence)]
+    return [*observed, _observed("difference_builds_up", builds_up, evidence)]
 
 
 def torque_task_observations(solenoid: Result, proportional: Result) -> list[Claim]:
@@ -467,10 +467,10 @@ def torque_task_observations(solenoid: Result, proportional: Result) -> list[Cla
         evidence = f"RMS error on the ramp {known[1]:.2f} against {known[0]:.2f} N m, "
         evidence += f"on the hold {known[3]:.2f} against {known[2]:.2f} N m"
     return [
-        _told("solenoid_oscillates_on_ramp", pair_ramp is not None and pair_ramp >= fewest, swings),
-        _told("solenoid_quiet_on_hold", pair_hold == 0, on_pair_hold),
-        _told("proportional_does_not_oscillate", ramp == 0 and hold == 0, f"{on_ramp}, {on_hold}"),
-        _told("proportional_tracks_better_on_ramp", tracks_better, evidence),
+        _observed("solenoid_oscillates_on_ramp", pair_ramp is not None and pair_ramp >= fewest, swings),
+        _observed("solenoid_quiet_on_hold", pair_hold == 0, on_pair_hold),
+        _observed("proportional_does_not_oscillate", ramp == 0 and hold == 0, f"{on_ramp}, {on_hold}"),
+        _observed("proportional_tracks_better_on_ramp", tracks_better, evidence),
     ]
 
 

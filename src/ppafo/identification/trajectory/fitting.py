@@ -60,7 +60,7 @@ from ppafo.simulation.plan import plan_run
 from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, SUPPLY, sample_period
 from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs, with_prescribed_angle
 from ppafo.simulation.scenario import FreeMotion, Scenario
-from ppafo.wording import count_of
+from ppafo.wording import count_of, first_twice
 
 _STATIC, _DYNAMIC = "friction.static_torque", "friction.dynamic_torque"
 _DEAD_TIMES = "delay", "time_offset"
@@ -671,14 +671,15 @@ def solve_section(
     """
     try:
         problem, candidates = problem_of(section, context, reader, bench, used), list[CandidateExperiment]()
+        labels = [experiment.label for experiment in problem.experiments]
+        if twice := first_twice([*labels, *(one.label for one in section.candidates)]):
+            raise IdentificationError(f"candidate '{twice}': another experiment or candidate has this label")
         for one in section.candidates:
             scenario = scenario_named(one.scenario, one.overrides, context, reader.folder)
             if one.interval > (longest := scenario.run.duration):
                 raise IdentificationError(
                     f"candidate '{one.label}': interval = {one.interval:g} s must be at most {longest:g} s"
                 )
-            if one.label in (*(each.label for each in problem.experiments), *(each.label for each in candidates)):
-                raise IdentificationError(f"candidate '{one.label}': another experiment or candidate has this label")
             candidates.append(CandidateExperiment(one.label, scenario, one.noise.by_channel(), one.interval))
         fitted = fit(problem, report)
         expected = expected_information(fitted, candidates)

@@ -313,8 +313,7 @@ def command_turning(scenario: Scenario, metrics: Mapping[str, Floats], most_reve
     Under sensor noise the reversals in the settled part count, if known. Arguments as in
     ``tracking_excess``.
     """
-    none = np.zeros(next(iter(metrics.values())).size)
-    turning = np.nan_to_num(metrics.get(REVERSALS, none)) / most_reversals
+    turning = np.nan_to_num(metrics.get(REVERSALS, np.zeros(next(iter(metrics.values())).size))) / most_reversals
     if "settled_reversals" not in metrics:
         return turning
     often = most_reversals / max(float(first(scenario.run.duration)), 1.0)
