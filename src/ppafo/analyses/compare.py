@@ -17,7 +17,7 @@ from ppafo.errors import StudyError, at_fault
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 from ppafo.units.shown import shown_in
-from ppafo.wording import argument_text, count_of, first_twice, known_names, said_of_configuration, without_exponent
+from ppafo.wording import count_of, first_twice, known_names, said_of_configuration, without_exponent
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -247,11 +247,6 @@ def compare(
         *(f"outputs: '{name}' is left out: not every configuration has this metric" for name in asked if lacks[name]),
         *_remarks(found),
     ]
-    if loaded is not None and loaded.drawn and draws is None and loaded.sample.runs != count:
-        remarks.append(
-            f"study '{loaded.name}': sample.runs = {loaded.sample.runs} applies to 'ppafo sweep' only; 'compare' used "
-            f"{count:,} draws, which {argument_text('draws')} changes"
-        )
     device = next(iter(scenarios.values()))
     with shown_in(device.device.shown if loaded is None else loaded.shown_for(device)):
         changes = _changes_of(chosen, None if configurations else loaded, tuple(overrides))

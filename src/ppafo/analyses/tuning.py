@@ -11,6 +11,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import resources
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -356,6 +357,12 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
             # Gauge pressures are refused where the atmosphere varies.
             limit = ask.level_of(bounds[0], metric, f"{where} = '{bounds[0]}'", atmosphere)
             limits.append(ask.MetricLimit(metric, limit, constraint.at_most is not None, bounds[0]))
+        for least, most in product(limits, limits):
+            if least.metric == most.metric and least.limit > most.limit and most.is_most and not least.is_most:
+                raise StudyError(
+                    f"constraint '{least.metric}': at_least = '{least.text}' is above at_most = '{most.text}', so no "
+                    "gains satisfy both"
+                )
         return Problem(
             name=parsed.name,
             description=" ".join(parsed.description.split()),

@@ -151,6 +151,15 @@ def test_the_tunings_of_the_package_load_and_fit_the_published_schema() -> None:
         ({"objective": [{"metric": "rms_error", "weight": 0.0}]}, "weight = 0 has no effect"),
         ({"objective": [{"metric": "rms_error", "scale": "2 g"}]}, "objective 'rms_error': scale = '2 g'"),
         ({"constraints": [{"metric": "rms_error"}]}, "has neither of at_most and at_least; give one of them"),
+        (
+            {
+                "constraints": [
+                    {"metric": "rms_error", key: text}
+                    for key, text in {"at_most": "1 N m", "at_least": "2 N m"}.items()
+                ]
+            },
+            "at_least = '2 N m' is above at_most = '1 N m'",
+        ),
         ({"constraints": [{"metric": "rms_error", "at_most": "2 g"}]}, "constraint 'rms_error' = '2 g'"),
         (
             {
