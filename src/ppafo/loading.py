@@ -17,7 +17,7 @@ from ppafo.parameters import ParameterSet
 from ppafo.parameters.declared import kind_at, schema_of
 from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.overrides import over, read_overrides
-from ppafo.plugins import Plugins, name_plugins, plugin_words
+from ppafo.plugins import Plugins, plugin_words
 from ppafo.simulation import loading as of_vanes
 from ppafo.simulation.declaration import OF_A_VANE
 from ppafo.simulation.motion_kind import MOTIONS, is_walk
@@ -70,7 +70,6 @@ def load_scenario(
     >>> print(f"{scenario.device.supply.pressure:.0f} Pa absolute")
     583958 Pa absolute
     """
-    name_plugins(plugins)
     # Vanes first: the code of walks is loaded for a walk only.
     name, path = str(scenario), Path(scenario)
     parameter_set = set_or_load(parameter_set)
@@ -114,7 +113,6 @@ def scenario_from_dict(content: Mapping[str, Any], overrides: Overrides = (), *,
     >>> ppafo.scenario_from_dict(content, ["run.duration=0.2 s"]).run.duration
     0.2
     """
-    name_plugins(plugins)
     request = of_vanes.request_of_dict(content, overrides)
     return of_vanes.scenario_of(request, _layout(request.document))
 

@@ -12,7 +12,7 @@ from ppafo.errors import ArgumentError, SimulationError
 from ppafo.loading import scenario_or_load
 from ppafo.model.sensors import GaitMeasurement, Measurement
 from ppafo.model.valves.kind import VENT
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 from ppafo.remedy_trials import verdict_of
 from ppafo.simulation import simulate as of_loaded
 from ppafo.simulation.contradictions import check_no_bottle
@@ -50,7 +50,6 @@ def simulate(scenario: Scenario | str | Path, overrides: Overrides = (), *, plug
     >>> print(f"{result.metrics['rms_error'].value:.3f} N m")
     0.196 N m
     """
-    name_plugins(plugins)
     return replace(of_loaded.simulate(scenario_or_load(scenario, overrides)), tries=verdict_of)
 
 
@@ -77,7 +76,6 @@ def simulate_many(
     >>> [f"{run.metrics['gas_supplied'].value:.2e} kg" for run in runs]
     ['4.16e-04 kg', '1.16e-03 kg']
     """
-    name_plugins(plugins)
     results = of_loaded.simulate_many([scenario_or_load(scenario) for scenario in scenarios], threads)
     return [replace(result, tries=verdict_of) for result in results]
 
@@ -203,5 +201,4 @@ def start(scenario: Scenario | str | Path, overrides: Overrides = (), *, plugins
     >>> print(f"{run.time:.1f} s, {measurement.torque:.2f} N m, {run.state.supplied_mass:.1e} kg of gas")
     0.1 s, 0.35 N m, 2.2e-05 kg of gas
     """
-    name_plugins(plugins)
     return SteppedRun(scenario_or_load(scenario, overrides))

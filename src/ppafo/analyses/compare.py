@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ppafo.analyses import ask, np
 from ppafo.arguments import Confidence, MaximumFailed, Name, Overrides, Seed, Tasks, Threads, Whole, Word, checked
 from ppafo.errors import StudyError, at_fault
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 from ppafo.progress import Report
 from ppafo.units.shown import shown_in
 from ppafo.wording import count_of, first_twice, known_names, said_of_configuration, without_exponent
@@ -185,7 +185,6 @@ def compare(
     >>> [(case.configuration, f"{case.metrics['rms_error'].value:.3f} N m") for case in cases]
     [('torque-task-proportional', '0.869 N m'), ('torque-task-solenoid', '1.026 N m')]
     """
-    name_plugins(plugins)
     count = DEFAULT_DRAWS if draws is None else draws
     if not ask.FEWEST_DRAWS <= count <= ask.MAXIMUM_DRAWS:
         raise StudyError(f"draws = {count!r}: must be at least {ask.FEWEST_DRAWS} and at most {ask.MAXIMUM_DRAWS:,}")

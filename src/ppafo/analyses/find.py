@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ppafo.analyses import ask, np
 from ppafo.arguments import Count, Overrides, Threads, Word, checked
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, at_fault, refused_as
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 from ppafo.progress import Report
 from ppafo.units import SI
 from ppafo.units.shown import shown_in
@@ -114,7 +114,6 @@ def find(
     supply.pressure = 54.7758 psi_g is the lowest value that meets rms_error <= 0.5 N m: rms_error is 0.5 N m there
     (bracketed to 3e-05 psi)
     """
-    name_plugins(plugins)
     base = ask.with_overrides(ask.scenario_or_load(scenario), overrides)
     # As in 'supply.pressure=2..6 bar_g' and 'final_error <= 30 N cm'.
     ranged = vary.rpartition("..")[2] if vary.strip().startswith(ask.PATHS_THAT_SET_UNITS) else ""

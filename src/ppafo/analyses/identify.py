@@ -12,7 +12,7 @@ from ppafo.analyses import ask
 from ppafo.arguments import Word, checked
 from ppafo.documents.json_text import fields_of, plain
 from ppafo.identification.estimate import Estimate, Identified
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 from ppafo.progress import Report, report_nothing
 from ppafo.units.shown import counted_from, in_units, shown_in
 from ppafo.wording import count_of, percentage
@@ -182,7 +182,6 @@ def identify(
     >>> print(str(ppafo.identify("measured-cylinder/cylinder.toml")).splitlines()[0])
     static-torque: 80 readings, 80 repetitions; scatter 0.233 N
     """
-    name_plugins(plugins)
     from ppafo.identification.bench.law import BenchContext
     from ppafo.identification.new_set import with_estimates
     from ppafo.identification.problem import load_problem

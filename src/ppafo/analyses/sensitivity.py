@@ -34,7 +34,7 @@ from ppafo.arguments import (
 )
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 from ppafo.progress import Report
 from ppafo.units.shown import shown_in
 from ppafo.wording import argument_text, known_names
@@ -119,7 +119,6 @@ def sensitivity(
     torque-task-uncertainty, solenoid: shapley, 64 orders, 1,152 runs of 7 uncertain values; bands with 95 %
     confidence
     """
-    name_plugins(plugins)
     if method is not None and method not in METHODS:
         raise StudyError(f"there is no method '{method}'{known_names(method, METHODS)}")
     chosen, base, used = ask.drawn_in(study, overrides, configuration, independent)

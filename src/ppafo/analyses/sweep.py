@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ppafo.analyses import ask, np
 from ppafo.arguments import Count, Executor, Overrides, Seed, Threads, Word, checked
 from ppafo.errors import StudyError
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.wording import said_of_configuration
 
@@ -76,7 +76,6 @@ def sweep(
     >>> study.summary["runs"], study.summary["completed"]
     (8, 8)
     """
-    name_plugins(plugins)
     from ppafo.analyses.study_results import SUMMARY, StudyResults, finding_of, summarise
     from ppafo.simulation.gains import warn_of_gains
     from ppafo.storage.files import temporary_folder

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from ppafo.arguments import Executor, Overrides, Seed, Threads, Word, checked
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 from ppafo.progress import Report
 
 if TYPE_CHECKING:
@@ -53,7 +53,6 @@ def tune(
     >>> print(ppafo.tune("pid-gains").said[0])
     pid-gains: objective 1 before, 0.008313 after (-99.2 %)
     """
-    name_plugins(plugins)
     from dataclasses import replace
 
     from ppafo.analyses.tuning import Problem, load_tuning, solve_tuning

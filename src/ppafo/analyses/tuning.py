@@ -25,7 +25,7 @@ from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import Number
 from ppafo.parameters.declared import SHORT_NAME, Words
 from ppafo.parameters.records import SchemaVersion, checked_record, keyed, record_schema
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 from ppafo.progress import Report, report_nothing
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.units.shown import in_units, quantity_of_unit
@@ -317,7 +317,6 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
     Tuning 'pid-gains' of 'torque-task-proportional': controller.proportional_gain, controller.integral_gain,
     controller.derivative_gain
     """
-    name_plugins(plugins)
     document, source = ask.read_source(TUNING, tuning)
     parsed = checked_record(TuningFile, document, source.file, StudyError, source.text)
     robust, paths = parsed.robust, [gain.path for gain in parsed.search]

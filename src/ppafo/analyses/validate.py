@@ -13,7 +13,7 @@ from ppafo.analyses import ask, np
 from ppafo.arguments import Duration, Name, Overrides, Volume, Word, checked
 from ppafo.documents.json_text import fields_of
 from ppafo.errors import DataError
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.units.shown import in_units
 from ppafo.version import __version__
@@ -181,7 +181,6 @@ def validate(
     >>> print(ppafo.validate("ppafo2011", [folder], motion="leg", overrides=["supply.pressure=55 psi_g"]).said[0])
     ppafo2011 agrees with 1 recording: every RMS error is within its limit; nothing but noise is left
     """
-    name_plugins(plugins)
     from ppafo.parameters import load_device
     from ppafo.validation.agreement import compare_recording
     from ppafo.validation.causes import causes_of

@@ -26,6 +26,7 @@ from typing import Annotated, Any, NamedTuple, ParamSpec, TypeVar
 
 from ppafo.arguments.reading import ANY, MAXIMUM_DIGITS, NUMBER, NumberRange, NumberWithUnit, Word, task
 from ppafo.errors import ArgumentError, PpafoError
+from ppafo.plugins import name_plugins
 from ppafo.units import SI, carried
 from ppafo.wording import nearest_name, read_by, reader
 
@@ -38,7 +39,7 @@ _QUOTED.maxstring = _QUOTED.maxother = 60
 
 
 def checked(function: Callable[P, R]) -> Callable[P, R]:
-    """Return a function that checks and converts its arguments before the call."""
+    """Return a function that checks and converts its arguments, and names its ``plugins``, before the call."""
 
     @functools.cache
     def signature() -> inspect.Signature:
@@ -55,6 +56,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
         asking = reader()
         with usual, read_by("function") if asking == "caller" else contextlib.nullcontext():
             try:
+                name_plugins(values.get("plugins", ()))
                 return function(**values)  # type: ignore[call-arg]  # names and types are those of the signature
             except PpafoError as error:
                 if asking == "caller" and error.argument in values:

@@ -33,7 +33,7 @@ from ppafo.exports.c_library.settings import limits_in_c
 from ppafo.loading import load_scenario
 from ppafo.model.controlled import CONTROLLED
 from ppafo.parameters.graph import ATMOSPHERE_PATH
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 from ppafo.report.kind import metric_quantity, metric_words
 from ppafo.report.setting_names import label_of
 from ppafo.running import simulate
@@ -132,7 +132,6 @@ def workbench(
     >>> ppafo.workbench(["torque-task-proportional"])[:15]
     b'<!DOCTYPE html>'
     """
-    name_plugins(plugins)
     sliders = tuple(map(str, sliders))
     simulations = [_simulation(str(name), tuple(overrides), sliders) for name in scenarios]
     names = [simulation["name"] for simulation in simulations]

@@ -49,7 +49,7 @@ from ppafo.parameters.parameter_set import (
     written_units,
 )
 from ppafo.parameters.records import record_from
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 from ppafo.units import check_unit
 from ppafo.wording import nearest_name
 
@@ -95,7 +95,6 @@ def load_device(
     >>> print(f"{device.supply.pressure:.0f} Pa absolute, {device.foot_plate.inertia:g} kg m^2")
     583958 Pa absolute, 0.0084 kg m^2
     """
-    name_plugins(plugins)
     given = read_overrides(overrides)
     check_valve(given, valve, f"valve = '{valve}'")
     loaded = parameter_set if isinstance(parameter_set, ParameterSet) else load_parameter_set(parameter_set)
@@ -112,7 +111,6 @@ def load_parameter_set(parameter_set: str | Path, *, plugins: Plugins = ()) -> P
     >>> ppafo.load_parameter_set("ppafo2011").title
     'Portable powered ankle-foot orthosis, completed'
     """
-    name_plugins(plugins)
     content, file = _FILE.read(parameter_set), label(str(parameter_set))
     return parse_parameter_set(content, file, Path(parameter_set).parent)
 

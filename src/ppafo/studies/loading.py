@@ -27,7 +27,7 @@ from ppafo.metrics import METRICS
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import other_forms, override_set, read_overrides
 from ppafo.parameters.records import checked_record
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import changes_in, chosen_path
 from ppafo.studies.declaration import NOT_RANDOM, SAME_AS, ConfigurationSection, Correlation, StudyFile
@@ -97,7 +97,6 @@ def load_study(
     >>> [configuration.name for configuration in study.configurations]
     ['proportional', 'solenoid']
     """
-    name_plugins(plugins)
     return _load(*read_source(STUDY_FILES, study), tuple(overrides), draws, seed)
 
 

@@ -16,7 +16,7 @@ from ppafo.parameters import ParameterSet
 from ppafo.parameters.declared import kind_at, value_at
 from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.overrides import read_overrides
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 from ppafo.simulation.building import assumed_lines, origin_of, read_gas_model, read_supply_line, with_settings
 from ppafo.simulation.clock import read_period
 from ppafo.simulation.contradictions import check_contradictions
@@ -177,7 +177,6 @@ def load_walk(
     >>> ppafo.load_walk("solenoid").name
     'solenoid'
     """
-    name_plugins(plugins)
     chosen = {"gait": gait, BOTTLE_NAME: bottle}
     named = [f"{path}={from_here(value)}" for path, value in chosen.items() if value is not None]
     changes, replacing = read_overrides((*overrides, *named), ScenarioError), set_or_load(parameter_set)

@@ -17,7 +17,7 @@ from ppafo.metrics import Metric
 from ppafo.model.leg import passive_torque
 from ppafo.parameters.device import Actuator, FootPlate, Friction
 from ppafo.parameters.graph import outside
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 from ppafo.simulation.clock import MAXIMUM_STEPS
 from ppafo.simulation.contradictions import check_no_bottle
 from ppafo.simulation.numbers import check_parts
@@ -86,7 +86,6 @@ def walk(
     >>> print(f"{result.metrics['toe_clearance'].value:.3f} m")
     -0.034 m
     """
-    name_plugins(plugins)
     if not isinstance(scenario, Scenario):
         scenario = load_walk(scenario, overrides, gait=gait, bottle=bottle)
     elif tuple(overrides) or any(choice is not None for choice in (gait, bottle)):

@@ -34,7 +34,7 @@ from ppafo.model.declaration import Number
 from ppafo.parameters.bottles.bottle import Bottle, load_bottle
 from ppafo.parameters.declared import SHORT_NAME, Many, Words
 from ppafo.parameters.records import SchemaVersion, checked_record, keyed, record_schema
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 from ppafo.signals.recording import Floats
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
@@ -235,7 +235,6 @@ def load_design(problem: str | Path, *, profile: str | Path | None = None, plugi
     >>> ppafo.load_design("push-off").name
     'push-off'
     """
-    name_plugins(plugins)
     file, folder = label(str(problem)), Path(problem).parent
     with at_fault("problem"):
         content = FILE.read(problem)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import Threads, Word, checked
 from ppafo.errors import StudyError
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 from ppafo.progress import Report, report_nothing
 
 if TYPE_CHECKING:
@@ -48,7 +48,6 @@ def design(
     >>> ppafo.design(replace(problem, gain_factors=(1.0,), largest_error=1.0)).found.choice.bottle.name
     'paper-co2-9oz'
     """
-    name_plugins(plugins)
     from ppafo.analyses.design.problem import load_design
     from ppafo.analyses.design.search import finding_of, size_for_profile
 

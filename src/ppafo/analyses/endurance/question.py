@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import Duration, Flow, Mass, Overrides, Word, checked
 from ppafo.errors import ParameterError
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 from ppafo.units.shown import shown_in, shown_text, units_in_force
 from ppafo.wording import argument_text
 
@@ -78,7 +78,6 @@ def bottle(
     >>> print(f"{found.walking_time / 60.0:.1f} min: {found.ending}")
     14.6 min: too cold
     """
-    name_plugins(plugins)
     from ppafo.analyses.endurance.discharge import (
         WALK_FILE,
         discharge,

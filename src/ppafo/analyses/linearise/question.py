@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import Overrides, Point, Word, checked
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 
 if TYPE_CHECKING:
     from ppafo.analyses.linearise.model import LinearModel
@@ -45,7 +45,6 @@ def linearise(
     >>> [f"{pole.real:.2f} 1/s" for pole in model.poles]
     ['-0.21 1/s', '-0.97 1/s']
     """
-    name_plugins(plugins)
     from ppafo.analyses.linearise.model import finding_of, linear_model
     from ppafo.simulation.loading import scenario_or_load
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import Overrides, Word, checked
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 from ppafo.progress import Progress, Report, report_nothing
 
 if TYPE_CHECKING:
@@ -43,7 +43,6 @@ def reproduce(
     >>> finding.title, finding.passed
     ('jmd-2016, run again', True)
     """
-    name_plugins(plugins)
     report = progress or report_nothing
     # Loading takes a second or two.
     report(Progress("loading the experiments"))

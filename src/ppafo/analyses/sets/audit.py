@@ -15,7 +15,7 @@ from ppafo.parameters.audit import AuditFinding, changed_paths, findings_of
 from ppafo.parameters.audit.changes import changes
 from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.parameter_set import with_followers
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins
 from ppafo.report.finding import Finding, Section, columns_of
 from ppafo.wording import argument_text, count_of
 
@@ -136,7 +136,6 @@ def audit(
     >>> [finding.id for finding in ppafo.audit("ppafo2011") if finding.severity == "warning"][:3]
     ['ideal-opening', 'flow-of-proportional', 'flow-of-solenoid']
     """
-    name_plugins(plugins)
     return audited([parameter_set], parent)
 
 
