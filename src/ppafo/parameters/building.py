@@ -295,7 +295,7 @@ def _reader(parameter_set: ParameterSet) -> Reader:
 
 
 def _orifice(parameter_set: ParameterSet, read: Reader, section: str) -> Orifice | SonicOrifice:
-    form = _orifice_form(parameter_set, section)
+    form = orifice_form(parameter_set, section)
     numbers = read(section, form)
     return SonicOrifice(**numbers) if form is declaration.SONIC_FORM else Orifice(**numbers)
 
@@ -307,7 +307,7 @@ def both_forms(parameter_set: ParameterSet, section: str) -> tuple[str, ...]:
     return tuple(path.rpartition(".")[2] for path in stated) if in_two_forms(stated) else ()
 
 
-def _orifice_form(parameter_set: ParameterSet, section: str) -> tuple[Quantity, ...]:
+def orifice_form(parameter_set: ParameterSet, section: str) -> tuple[Quantity, ...]:
     """Return the quantities of the form of an orifice. Raises ParameterError for an orifice in both forms."""
     both = both_forms(parameter_set, section)
     if both:
@@ -327,7 +327,7 @@ def missing_values(parameter_set: ParameterSet, valve: str) -> list[str]:
     ]
     leaks = () if parameter_set.has_one_chamber else ("actuator.leak",)
     for section in (*leaks, f"valves.{valve}"):
-        needed += [f"{section}.{member.name}" for member in _orifice_form(parameter_set, section)]
+        needed += [f"{section}.{member.name}" for member in orifice_form(parameter_set, section)]
     kind = parameter_set.valve_kinds[valve]
     needed += [f"valves.{valve}.{member.name}" for member in VALVES[kind].quantities if member.default is None]
     # Without numbers of their own, chamber 2 has the pressure of chamber 1, and a vane displaces its torque constant.

@@ -306,7 +306,7 @@ def _bench_figure() -> tuple[BenchResult, BenchResult]:
 
 def arithmetic_claims(reported: ParameterSet) -> list[Claim]:
     """Return the claims that the paper's numbers alone decide: what the audit of its set finds, and percentages."""
-    entries, evidence = paper_entries(), Evidence(reported, reported.declarations())
+    entries, evidence = paper_entries(), Evidence(reported)
     found, claims = {finding.id: finding for finding in findings_of(reported)}, list[Claim]()
     tested = dict[str, tuple[bool, list[str]]]()
     for identifier, (ids, side, value) in _AUDITED.items():

@@ -1,69 +1,47 @@
 """Consistency checks of a parameter set.
 
-All checks run, in the order of the report. A reason given by the author of the set accepts a finding. To add a check,
-write a function in the module of its subject and list it here.
+All questions are asked, in the order of the report; one whose numbers the set lacks has no answer. A reason given by
+the author of the set accepts a finding. To add a question, write a function in the module of its subject and list it
+here.
 """
 
-from collections.abc import Callable, Iterator
+import contextlib
 from dataclasses import replace
 
-from ppafo.parameters.audit.chambers import (
-    check_filling,
-    check_rotation,
-    check_rounded_table,
-    check_stroke,
-    check_virtual_work,
-    check_volumes,
-)
+from ppafo.errors import ParameterError
+from ppafo.parameters.audit import actuator, orifices, values
 from ppafo.parameters.audit.changes import changes
-from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence, NamedValue, Severity
-from ppafo.parameters.audit.inertia import check_inertia
-from ppafo.parameters.audit.orifices import check_bores, check_flow, check_orifices
-from ppafo.parameters.audit.torque import (
-    check_published_torque,
-    check_set_pressures,
-    check_torque_ceiling,
-    check_vacuum,
-)
-from ppafo.parameters.audit.values import (
-    check_choked_flow,
-    check_contradictions,
-    check_dimensions,
-    check_gas_data,
-    check_ideal_gas,
-    check_missing,
-    check_ranges,
-    check_statements,
-)
+from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence, NamedValue, Question, Severity
 from ppafo.parameters.loading import set_or_load
-from ppafo.parameters.parameter_set import ParameterSet, overridden_paths, with_followers
+from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, overridden_paths, with_followers
 
 __all__ = ["AuditFinding", "ComparedNumber", "NamedValue", "Severity", "changed_paths", "findings_of"]
 
-CHECKS: dict[str, Callable[[Evidence], Iterator[AuditFinding]]] = {
-    "missing": check_missing,
-    "contradictions": check_contradictions,
-    "statements": check_statements,
-    "dimensions": check_dimensions,
-    "ranges": check_ranges,
-    "gas data": check_gas_data,
-    "orifices": check_orifices,
-    "bores": check_bores,
-    "choked flow": check_choked_flow,
-    "flow": check_flow,
-    "inertia": check_inertia,
-    "virtual work": check_virtual_work,
-    "volumes": check_volumes,
-    "rounded table": check_rounded_table,
-    "rotation": check_rotation,
-    "stroke": check_stroke,
-    "filling": check_filling,
-    "vacuum": check_vacuum,
-    "set pressures": check_set_pressures,
-    "torque ceiling": check_torque_ceiling,
-    "published torque": check_published_torque,
-    "ideal gas": check_ideal_gas,
-}
+QUESTIONS: tuple[Question, ...] = (
+    values.missing,
+    values.contradictions,
+    values.statements,
+    values.dimensions,
+    values.ranges,
+    values.gas_data,
+    orifices.forms,
+    orifices.open_flow,
+    orifices.bores,
+    values.flow_constants,
+    orifices.flow,
+    actuator.inertia,
+    actuator.virtual_work,
+    actuator.volumes,
+    actuator.rounded_table,
+    actuator.rotation,
+    actuator.stroke,
+    actuator.filling,
+    actuator.vacuum,
+    actuator.set_pressures,
+    actuator.torque_ceiling,
+    actuator.published_torque,
+    values.ideal_gas,
+)
 _ORDER = {"error": 0, "warning": 1, "note": 2}
 
 
@@ -74,8 +52,12 @@ def findings_of(audited: ParameterSet, parent: ParameterSet | None = None) -> li
     the parent states too lapses if the set changes a value of the finding.
     """
     of_parent = set_or_load(parent or audited.parent or None)
-    evidence = Evidence(with_followers(audited), audited.declarations())
-    findings = [finding for check in CHECKS.values() for finding in check(evidence)]
+    # Numbers cannot be compared without the zero of gauge pressures.
+    atmospheric_pressure(audited)
+    evidence, findings = Evidence(with_followers(audited)), list[AuditFinding]()
+    for question in QUESTIONS:
+        with contextlib.suppress(ParameterError):
+            findings.extend(question(evidence))
     changed, ids = overridden_paths(audited), {finding.id for finding in findings}
     judged = []
     for finding in findings:

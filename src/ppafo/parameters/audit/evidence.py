@@ -1,23 +1,23 @@
-"""Audit finding with its compared numbers, and access of the checks to a parameter set."""
+"""Finding of an audit with its compared numbers, and a parameter set as the questions of an audit read it."""
 
 import contextlib
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from decimal import Decimal
+from types import MappingProxyType
 from typing import Any, Literal, NamedTuple
 
-from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
-from ppafo.errors import UnitError
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.errors import ParameterError, UnitError
 from ppafo.model.declaration import Quantity
-from ppafo.model.gas import specific_gas_constant
 from ppafo.model.plant import chamber_1_volume
-from ppafo.parameters.declaration import alternatives, fits, is_within
+from ppafo.parameters.declaration import fits, is_within
 from ppafo.parameters.device import Gas
 from ppafo.parameters.graph import ATMOSPHERE_PATH
-from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, number_in_si
+from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, in_first_unit, number_in_si
 from ppafo.units import from_si
-from ppafo.units.shown import shown_in, shown_unit, shown_value
+from ppafo.units.shown import shown_unit
 from ppafo.units.spelling import DECIMALS
 
 Severity = Literal["error", "warning", "note"]
@@ -102,26 +102,38 @@ class ReportedRange(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """Parameter set and declarations, as read by the checks of an audit."""
+    """Parameter set as the questions of an audit read it; a question whose numbers it lacks is not asked."""
 
     parameter_set: ParameterSet
-    declared: Mapping[str, Quantity]
+
+    @property
+    def declared(self) -> Mapping[str, Quantity]:
+        """Declarations of all numbers that the set may contain, by path."""
+        return self.parameter_set.declarations()
 
     def number(self, path: str) -> float | None:
         """Return the value of a parameter [SI]; None if absent or with a magnitude outside 1e-20 to 1e20."""
         value = number_in_si(self.parameter_set, path)
         return value if value is None or value == 0.0 or _SMALLEST < abs(value) < _LARGEST else None
 
-    def numbers(self, *paths: str) -> tuple[float, ...] | None:
-        """Return the values of all parameters [SI]; None if any is missing."""
-        values = [self.number(path) for path in paths]
-        present = tuple(value for value in values if value is not None)
-        return present if len(present) == len(paths) else None
+    def numbers(self, *paths: str) -> tuple[float, ...]:
+        """Return the values of parameters [SI]. Raises ParameterError if the set lacks one."""
+        values = tuple(value for path in paths if (value := self.number(path)) is not None)
+        if len(values) < len(paths):
+            raise ParameterError(f"not all are given: {', '.join(paths)}")
+        return values
 
-    def text(self, path: str) -> str | None:
-        """Return the name or formula at a path."""
+    def positive(self, *paths: str) -> tuple[float, ...]:
+        """Return the values of parameters [SI]. Raises ParameterError if one is missing, or not above 0."""
+        values = self.numbers(*paths)
+        if min(values) <= 0.0:
+            raise ParameterError(f"{' or '.join(paths)} is not above 0")
+        return values
+
+    def text(self, path: str) -> str:
+        """Return the name or formula at a path; "" without one."""
         entry = self.parameter_set.texts.get(path)
-        return None if entry is None else str(entry.value)
+        return "" if entry is None else str(entry.value)
 
     def magnitude(self, path: str) -> ReportedRange | None:
         """Return the interval of the magnitude of a parameter [SI]: its stated uncertainty, else its rounding."""
@@ -136,38 +148,41 @@ class Evidence:
     def in_set_unit(self, path: str, value: float) -> str:
         """Format an SI value in the unit of a parameter in the set, for example ``84 g m^2``."""
         entry, quantity = self.parameter_set.numbers.get(path), self.declared[path]
-        if entry is not None:
-            for unit in alternatives(quantity):
-                with contextlib.suppress(UnitError):
-                    converted = from_si(value, entry.unit, unit, atmospheric_pressure(self.parameter_set))
-                    return f"{converted:.4g} {entry.unit}".rstrip()
+        with contextlib.suppress(UnitError):
+            if entry is not None:
+                room, given = atmospheric_pressure(self.parameter_set), entry.unit
+                number = in_first_unit(quantity, lambda unit: from_si(value, given, unit, room))
+                return f"{number:.4g} {given}".rstrip()
         return f"{value:.4g} {quantity.unit.removesuffix('_a')}".rstrip()
 
-    def torque(self, value: float, form: str = ".3g") -> str:
-        """Format a torque [N m] in the torque unit of the set, for example ``550 N cm``."""
-        with shown_in(self.parameter_set.shown):
-            number, unit = f"{shown_value(value, 'N m'):{form}}", shown_unit("N m")
-        # A form that keeps zeros makes "550." of 550.
-        return f"{number.removesuffix('.')} {unit}"
-
-    def values_of(self, *paths: str) -> tuple[NamedValue, ...]:
-        """Return the values of parameters, as stated in the set; missing values are omitted."""
+    def finding(
+        self,
+        identifier: str,
+        title: str,
+        paths: Sequence[str],
+        sides: Mapping[str, tuple[float, str]] = MappingProxyType({}),
+        why: str = "",
+        severity: Severity = "error",
+    ) -> AuditFinding:
+        """Return a finding on the values at ``paths``, with number and SI unit of each side that it compares."""
         numbers, texts = self.parameter_set.numbers, self.parameter_set.texts
         values = [NamedValue(p, numbers[p].value, numbers[p].unit, numbers[p].origin) for p in paths if p in numbers]
-        return (*values, *(NamedValue(p, str(texts[p].value), "", texts[p].origin) for p in paths if p in texts))
+        values += [NamedValue(p, str(texts[p].value), "", texts[p].origin) for p in paths if p in texts]
+        compared = tuple(ComparedNumber(label, value, unit) for label, (value, unit) in sides.items())
+        return AuditFinding(id=identifier, severity=severity, title=title, values=(*values,), sides=compared, why=why)
 
-    def gas(self) -> Gas | None:
-        """Return the gas; None if the set lacks one of its numbers or a number is out of range."""
+    def gas(self) -> Gas:
+        """Return the gas. Raises ParameterError if the set lacks one of its numbers or a number is out of range."""
         values = self.numbers(*GAS_PATHS)
-        if values is None or not all(is_within(values[i], self.declared[path]) for i, path in enumerate(GAS_PATHS)):
-            return None
+        if not all(is_within(value, self.declared[path]) for path, value in zip(GAS_PATHS, values, strict=True)):
+            raise ParameterError("the gas is out of range")
         return Gas(self.text("gas.species") or "gas", *values)
 
     def atmosphere(self) -> float:
         """Return the ambient pressure [Pa absolute]; the standard atmosphere if the set states none."""
         return self.number(ATMOSPHERE_PATH) or STANDARD_ATMOSPHERE
 
-    def angle_range(self) -> tuple[str, float, str, float] | None:
+    def angle_range(self) -> tuple[str, float, str, float]:
         """Return path and value [rad] of the smallest and the largest angle in use, from reports or else the stops."""
         numbers = self.parameter_set.numbers
         low_path, high_path = (
@@ -177,19 +192,36 @@ class Evidence:
                 ("reported.largest_angle", "actuator.angle_max"),
             )
         )
-        ends = self.numbers(low_path, high_path)
-        return None if ends is None else (low_path, ends[0], high_path, ends[1])
+        low, high = self.numbers(low_path, high_path)
+        return low_path, low, high_path, high
 
-    def single_fill_gas(self) -> str | None:
-        """Return the path of the first reported gas use of a single filling."""
-        paths = (f"reported.valves.{name}.single_fill_gas" for name in self.parameter_set.valve_kinds)
-        return next((path for path in paths if self.number(path)), None)
-
-    def chamber_1_volume(self, angle: float) -> float | None:
+    def chamber_1_volume(self, angle: float) -> float:
         """Return the volume of chamber 1 [m^3] at an angle [rad]; a missing dead volume counts as 0."""
-        values = self.numbers("actuator.displacement_per_radian", "actuator.angle_min")
-        dead_volume = self.number("actuator.dead_volume_1") or 0.0
-        return None if values is None else chamber_1_volume(angle, values[1], values[0], dead_volume)
+        slope, start = self.numbers("actuator.displacement_per_radian", "actuator.angle_min")
+        volume = chamber_1_volume(angle, start, slope, self.number("actuator.dead_volume_1") or 0.0)
+        if volume <= 0.0:
+            raise ParameterError("chamber 1 has no volume")
+        return volume
+
+
+Question = Callable[[Evidence], Iterator[AuditFinding]]
+"""Question of an audit to a parameter set."""
+
+
+def of_each_valve(question: Callable[[Evidence, str], Iterator[AuditFinding]]) -> Question:
+    """Decorate a question to a valve: it is asked of each valve of a set, but of one whose numbers are missing."""
+
+    def asked(evidence: Evidence) -> Iterator[AuditFinding]:
+        for valve in evidence.parameter_set.valve_kinds:
+            with contextlib.suppress(ParameterError):
+                yield from question(evidence, valve)
+
+    return asked
+
+
+def identifier_of(path: str) -> str:
+    """Return the name of a finding on the value at a path."""
+    return path.replace(".", "-").replace("_", "-")
 
 
 def digits(value: float) -> ReportedRange:
@@ -200,8 +232,3 @@ def digits(value: float) -> ReportedRange:
 def _half_digit(value: float) -> float:
     exponent = Decimal(repr(value)).normalize(DECIMALS).as_tuple().exponent
     return 0.5 * 10.0 ** min(int(exponent), 0)
-
-
-def density_change(gas: Gas, pressure_change: float) -> float:
-    """Return the change of density [kg/m^3] of an ideal gas with pressure [Pa] at its temperature; equation (3)."""
-    return pressure_change / (specific_gas_constant(UNIVERSAL_GAS_CONSTANT, gas.molar_mass) * gas.temperature)

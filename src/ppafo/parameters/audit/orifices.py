@@ -1,22 +1,21 @@
-"""Checks of the orifices of a set: one form, flow of the open valves against reports, areas that are bores of tubes.
+"""Questions on the orifices: one form, flow of the open valves against reports, areas that are bores of tubes.
 
 Equations (6) and (7), and ISO 6358.
 """
 
+import contextlib
 import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from ppafo.model.declaration import Quantity
+from ppafo.errors import ParameterError
 from ppafo.model.orifice import isentropic_flow_function, iso6358_flow_function
-from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence, ReportedRange
-from ppafo.parameters.building import both_forms
-from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM
+from ppafo.parameters.audit.evidence import AuditFinding, Evidence, ReportedRange, of_each_valve
+from ppafo.parameters.building import both_forms, orifice_form
+from ppafo.parameters.declaration import AREA_FORM
 from ppafo.parameters.device import Orifice, SonicOrifice
 from ppafo.parameters.plant import restriction
 
-_SUPPLY = "supply.pressure"
-_GRAMS = 1e3
 _MODEL = 0.02
 """Relative tolerance of the flow model, about the accuracy of a flow measurement."""
 _INCH = 25.4e-3
@@ -35,150 +34,124 @@ _SAME_BORE = 0.005
 
 
 class _OpenValve(NamedTuple):
-    """Valve that is fully open: numbers of its form, Cd A [m^2] or C [m^3/(s Pa)], conductance, and flow [kg/s]."""
+    """Valve that is fully open: paths and numbers of its form, conductance [kg/(s Pa)], and flow [kg/s]."""
 
-    form: tuple[Quantity, ...]
-    size: float
+    paths: tuple[str, ...]
+    numbers: tuple[float, ...]
+    is_area: bool
     conductance: float
     flow: float
 
 
-def _open_valve(evidence: Evidence, section: str, upstream: float, downstream: float) -> _OpenValve | None:
-    """Return an open valve between two pressures [Pa absolute]; None without a gas, or without one form."""
-    gas = evidence.gas()
-    if gas is None or both_forms(evidence.parameter_set, section) or not upstream > downstream > 0.0:
-        return None
+def _open_valve(evidence: Evidence, valve: str, upstream: float, downstream: float) -> _OpenValve:
+    """Return a valve between two pressures [Pa absolute]. Raises ParameterError without a gas, one form or a flow."""
+    gas, form = evidence.gas(), orifice_form(evidence.parameter_set, f"valves.{valve}")
+    paths, is_area = tuple(f"valves.{valve}.{quantity.name}" for quantity in form), form is AREA_FORM
+    numbers = evidence.positive(*paths)
+    if not upstream > downstream > 0.0 or not (is_area or numbers[1] < 1.0):
+        raise ParameterError(f"valve '{valve}' passes nothing")
     ratio = downstream / upstream
-    for form in (AREA_FORM, SONIC_FORM):
-        numbers = evidence.numbers(*(f"{section}.{quantity.name}" for quantity in form))
-        if numbers is not None and min(numbers) > 0.0 and (form is AREA_FORM or numbers[1] < 1.0):
-            is_area = form is AREA_FORM
-            conductance = restriction(Orifice(*numbers) if is_area else SonicOrifice(*numbers), gas, 0.0).conductance
-            psi = isentropic_flow_function(ratio, gas.heat_capacity_ratio) if is_area else None
-            flow = conductance * upstream * (iso6358_flow_function(ratio, numbers[1]) if psi is None else psi)
-            return _OpenValve(form, numbers[0] * numbers[1] if is_area else numbers[0], conductance, flow)
-    return None
+    psi = (
+        isentropic_flow_function(ratio, gas.heat_capacity_ratio)
+        if is_area
+        else iso6358_flow_function(ratio, numbers[1])
+    )
+    conductance = restriction((Orifice if is_area else SonicOrifice)(*numbers), gas, 0.0).conductance
+    return _OpenValve(paths, numbers, is_area, conductance, conductance * upstream * psi)
 
 
-def check_orifices(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield an error for an orifice in two forms, and a note on the flow of each valve with the gas of the set."""
-    valves = {name: f"valves.{name}" for name in evidence.parameter_set.valve_kinds}
-    for section in ("actuator.leak", *valves.values()):
-        names = both_forms(evidence.parameter_set, section)
-        if names:
-            yield AuditFinding(
-                id=f"forms-of-{section.rpartition('.')[2]}",
-                title=f"{section} is given in two forms",
-                values=evidence.values_of(*(f"{section}.{name}" for name in names)),
+def forms(evidence: Evidence) -> Iterator[AuditFinding]:
+    """Name each orifice that is given in two forms."""
+    for section in ("actuator.leak", *(f"valves.{name}" for name in evidence.parameter_set.valve_kinds)):
+        if names := both_forms(evidence.parameter_set, section):
+            yield evidence.finding(
+                f"forms-of-{section.rpartition('.')[2]}",
+                f"{section} is given in two forms",
+                [f"{section}.{name}" for name in names],
                 why=f"{section} has {', '.join(names)}, which specify one orifice twice.",
             )
-    supply, atmosphere = evidence.number(_SUPPLY), evidence.atmosphere()
-    for name, section in valves.items():
-        if supply is None:
-            return
-        opened = _open_valve(evidence, section, max(supply, atmosphere), min(supply, atmosphere))
-        if opened is None:
-            continue
-        gas, is_vacuum = evidence.text("gas.species") or "gas", supply < atmosphere
-        yield AuditFinding(
-            id=f"open-flow-of-{name}",
-            severity="note",
-            title=f"valve '{name}' passes {_GRAMS * opened.flow:#.3g} g/s of {gas}",
-            values=evidence.values_of(*(f"{section}.{quantity.name}" for quantity in opened.form), _SUPPLY),
-            sides=(
-                ComparedNumber(
-                    f"flow from {'atmosphere to vacuum' if is_vacuum else 'supply to atmosphere'}", opened.flow, "kg/s"
-                ),
-                ComparedNumber("conductance", opened.conductance, "kg/(s Pa)"),
-            ),
-            why=f"C of ISO 6358 counts for air and is converted to {gas}."
-            if opened.form is not AREA_FORM and gas != "air"
-            else "",
-        )
 
 
-def check_flow(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield an error for each valve whose reported flow contradicts its orifice, and for an impossible common Cd."""
+@of_each_valve
+def open_flow(evidence: Evidence, valve: str) -> Iterator[AuditFinding]:
+    """Note the flow of a valve with the gas of the set."""
+    (supply,), atmosphere = evidence.numbers("supply.pressure"), evidence.atmosphere()
+    opened = _open_valve(evidence, valve, max(supply, atmosphere), min(supply, atmosphere))
+    gas, way = evidence.gas().species, "atmosphere to vacuum" if supply < atmosphere else "supply to atmosphere"
+    is_converted = not opened.is_area and gas != "air"
+    yield evidence.finding(
+        f"open-flow-of-{valve}",
+        f"valve '{valve}' passes {1e3 * opened.flow:#.3g} g/s of {gas}",
+        [*opened.paths, "supply.pressure"],
+        {f"flow from {way}": (opened.flow, "kg/s"), "conductance": (opened.conductance, "kg/(s Pa)")},
+        f"C of ISO 6358 counts for air and is converted to {gas}." if is_converted else "",
+        "note",
+    )
+
+
+def flow(evidence: Evidence) -> Iterator[AuditFinding]:
+    """Name each valve whose reported flow contradicts its orifice, and two whose flows contradict their common Cd."""
     measured: dict[str, tuple[float, float, float]] = {}
-    for name in evidence.parameter_set.valve_kinds:
-        section, reported = f"valves.{name}", f"reported.valves.{name}"
-        paths = (f"{reported}.mass_flow", f"{reported}.flow_pressure")
-        numbers, flow_range = evidence.numbers(*paths), evidence.magnitude(paths[0])
-        if numbers is None or flow_range is None or min(numbers) <= 0.0:
-            continue
-        opened = _open_valve(evidence, section, numbers[1], min(evidence.atmosphere(), numbers[1]))
-        if opened is None:
-            continue
-        is_area = opened.form is AREA_FORM
-        sizes = [f"{section}.{quantity.name}" for quantity in opened.form[: 2 if is_area else 1]]
-        # Reported digits are ranges: a contradiction must hold for all numbers in them.
-        possible = ReportedRange(1.0 - _MODEL, 1.0 + _MODEL)
-        for interval in map(evidence.magnitude, sizes):
-            possible = possible if interval is None else possible.times(interval)
-        per_size, values = opened.flow / opened.size, evidence.values_of(*sizes, *paths)
-        size, predicted = ("Cd A", "Cd A C1 P") if is_area else ("sonic conductance", "flow of the sonic conductance")
-        needed = numbers[0] / per_size
-        sides = [
-            ComparedNumber("reported flow", numbers[0], "kg/s"),
-            ComparedNumber(predicted, opened.flow, "kg/s"),
-            ComparedNumber(f"{size} that gives the reported flow", needed, opened.form[0].unit),
-        ]
-        if is_area:
-            area, coefficient = (evidence.number(path) or math.nan for path in sizes)
-            measured[name] = area, coefficient, needed
-            sides += [ComparedNumber("Cd with the reported area", needed / area, "")]
-            sides += [ComparedNumber("area with the reported Cd", needed / coefficient, "m^2")]
-        if not possible.times(ReportedRange(per_size, per_size)).meets(flow_range):
-            title = f"the reported flow of valve '{name}' does not follow from {size if is_area else f'its {size}'}"
-            yield AuditFinding(id=f"flow-of-{name}", title=title, values=values, sides=tuple(sides))
-    yield from _check_shared_coefficient(evidence, measured)
-
-
-def _check_shared_coefficient(
-    evidence: Evidence, measured: dict[str, tuple[float, float, float]]
-) -> Iterator[AuditFinding]:
-    """Yield an error if two valves of equal Cd have reported flows that are not in the ratio of their areas.
-
-    ``measured`` has the area, Cd, and the Cd A of the reported flow by valve.
-    """
-    for name, other in [*measured.items()][1:]:
-        first_name, first = next(iter(measured.items()))
-        area_ratio, flow_ratio = first[0] / other[0], first[2] / other[2]
-        if first[1] != other[1] or abs(area_ratio / flow_ratio - 1.0) < 2.0 * _MODEL:
-            continue
-        numbers = ("area", "discharge_coefficient")
-        paths = (
-            path
-            for valve in (first_name, name)
-            for path in (*(f"valves.{valve}.{number}" for number in numbers), f"reported.valves.{valve}.mass_flow")
-        )
-        yield AuditFinding(
-            id=f"one-coefficient-{first_name}-{name}",
-            title=f"the reported flows of '{first_name}' and '{name}' contradict their common Cd",
-            values=evidence.values_of(*paths),
-            sides=(
-                ComparedNumber("ratio of the areas", area_ratio, ""),
-                ComparedNumber("ratio of the reported flows", flow_ratio, ""),
-                ComparedNumber(f"Cd that gives the flow of '{first_name}'", first[2] / first[0], ""),
-                ComparedNumber(f"Cd that gives the flow of '{name}'", other[2] / other[0], ""),
-            ),
-        )
-
-
-def check_bores(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a note for each valve whose area is the bore of a tube: its Cd then describes no orifice."""
     for valve in evidence.parameter_set.valve_kinds:
-        path = f"valves.{valve}.area"
-        area = evidence.number(path) or 0.0
-        for name, diameter in _TUBES.items():
-            bore = 0.25 * math.pi * diameter * diameter
-            if abs(area / bore - 1.0) > _SAME_BORE:
-                continue
-            yield AuditFinding(
-                id=f"bore-of-{valve}",
-                severity="note",
-                title=f"the area of valve '{valve}' is the bore of a {name} tube",
-                values=evidence.values_of(path, f"valves.{valve}.discharge_coefficient"),
-                sides=(ComparedNumber("area", area, "m^2"), ComparedNumber(f"bore of {name}", bore, "m^2")),
-                why="The orifice in a valve is smaller than its ports: only the product of Cd and area is meaningful.",
+        paths = f"reported.valves.{valve}.mass_flow", f"reported.valves.{valve}.flow_pressure"
+        with contextlib.suppress(ParameterError):
+            reported, pressure = evidence.positive(*paths)
+            opened = _open_valve(evidence, valve, pressure, min(evidence.atmosphere(), pressure))
+            sizes = opened.numbers if opened.is_area else opened.numbers[:1]
+            # Reported digits are ranges: a contradiction must hold for all numbers in them.
+            possible = ReportedRange(1.0 - _MODEL, 1.0 + _MODEL)
+            for path in opened.paths[: len(sizes)]:
+                possible = possible.times(evidence.magnitude(path) or ReportedRange(1.0, 1.0))
+            per_size = opened.flow / math.prod(sizes)
+            needed = reported / per_size
+            kind, formula = "sonic conductance", "flow of the sonic conductance"
+            if opened.is_area:
+                kind, formula = "Cd A", "Cd A C1 P"
+                measured[valve] = sizes[0], sizes[1], needed
+            sides = {
+                "reported flow": (reported, "kg/s"),
+                formula: (opened.flow, "kg/s"),
+                f"{kind} that gives the reported flow": (needed, "m^2" if opened.is_area else "m^3/(s Pa)"),
+            }
+            if opened.is_area:
+                sides["Cd with the reported area"] = (needed / sizes[0], "")
+                sides["area with the reported Cd"] = (needed / sizes[1], "m^2")
+            stated = evidence.magnitude(paths[0])
+            if stated is not None and not possible.times(ReportedRange(per_size, per_size)).meets(stated):
+                source = kind if opened.is_area else f"its {kind}"
+                title = f"the reported flow of valve '{valve}' does not follow from {source}"
+                yield evidence.finding(f"flow-of-{valve}", title, [*opened.paths[: len(sizes)], *paths], sides)
+    for other, (other_area, other_coefficient, other_size) in [*measured.items()][1:]:
+        first, (area, coefficient, size) = next(iter(measured.items()))
+        area_ratio, flow_ratio = area / other_area, size / other_size
+        if coefficient == other_coefficient and abs(area_ratio / flow_ratio - 1.0) >= 2.0 * _MODEL:
+            parts = "valves.{}.area", "valves.{}.discharge_coefficient", "reported.valves.{}.mass_flow"
+            yield evidence.finding(
+                f"one-coefficient-{first}-{other}",
+                f"the reported flows of '{first}' and '{other}' contradict their common Cd",
+                [part.format(valve) for valve in (first, other) for part in parts],
+                {
+                    "ratio of the areas": (area_ratio, ""),
+                    "ratio of the reported flows": (flow_ratio, ""),
+                    f"Cd that gives the flow of '{first}'": (size / area, ""),
+                    f"Cd that gives the flow of '{other}'": (other_size / other_area, ""),
+                },
+            )
+
+
+@of_each_valve
+def bores(evidence: Evidence, valve: str) -> Iterator[AuditFinding]:
+    """Note an area that is the bore of a tube: its Cd then describes no orifice."""
+    path = f"valves.{valve}.area"
+    (area,) = evidence.numbers(path)
+    for name, diameter in _TUBES.items():
+        bore = 0.25 * math.pi * diameter * diameter
+        if abs(area / bore - 1.0) <= _SAME_BORE:
+            yield evidence.finding(
+                f"bore-of-{valve}",
+                f"the area of valve '{valve}' is the bore of a {name} tube",
+                [path, f"valves.{valve}.discharge_coefficient"],
+                {"area": (area, "m^2"), f"bore of {name}": (bore, "m^2")},
+                "The orifice in a valve is smaller than its ports: only the product of Cd and area is meaningful.",
+                "note",
             )
