@@ -731,7 +731,7 @@ def _finding(tuned: Tuned) -> ask.Finding[Tuned]:
                 remarks=tuned.remarks,
                 panels=partial(_search_panels, tuned),
                 name="search",
-                caption="Below: a gain before that is beyond a bound is drawn beside it.",
+                caption="A gain before that is beyond a bound is drawn beside it.",
                 size=(5.4, max(2.2, 0.9 + 0.3 * len(problem.searched))),
             ),
             ask.Section("To use the gains", code=used),
@@ -774,12 +774,12 @@ def _search_panels(tuned: Tuned) -> list[ask.Panel]:
     for number, start in enumerate(starts):
         costs = np.array(start.generations)
         costs[costs >= INFEASIBLE] = np.nan  # no candidate keeps the constraints yet
+        if np.isnan(costs).all():
+            continue
         label = f"start {number + 1}" if len(starts) <= len(_START_COLOURS) else ""
         colour = _START_COLOURS[number % len(_START_COLOURS)]
         courses.append(ask.Mark("line", np.arange(costs.size), costs, label=label, colour=colour))
-    courses.append(
-        ask.Mark("level", y=tuned.before.objective, label="before", colour=ask.BLACK, style={"linewidth": 0.8})
-    )
+    level = ask.Mark("level", y=tuned.before.objective, label="before", colour=ask.BLACK, style={"linewidth": 0.8})
 
     def scale(axes: Any) -> None:
         axes.locator_params(axis="x", integer=True)
@@ -799,7 +799,8 @@ def _search_panels(tuned: Tuned) -> list[ask.Panel]:
     )
     every = {"yticks": rows, "yticklabels": [ask.label_of(gain.place.path) for gain in searched], "xticks": [0.0, 1.0]}
     every |= {"ylim": (-0.6, len(searched) - 0.4), "xticklabels": ["minimum", "maximum"]}
-    return [
-        ask.Panel(ask.Kind("Generation"), ask.Kind(), courses, "Objective, best so far", legend="inside", then=scale),
-        ask.Panel(ask.Kind("Between bounds"), ask.Kind(), marks, then=lambda axes: axes.set(**every)),
-    ]
+    ranges = ask.Panel(ask.Kind("Between bounds"), ask.Kind(), marks, then=lambda axes: axes.set(**every))
+    if not courses:
+        return [ranges]
+    kinds, title = (ask.Kind("Generation"), ask.Kind()), "Objective, best so far"
+    return [ask.Panel(*kinds, [*courses, level], title, legend="inside", then=scale), ranges]

@@ -135,12 +135,12 @@ def texts_of(entry: Mapping[str, Any]) -> list[object]:
 def axis_or_distribution(entry: Mapping[str, Any], varied: VariedPath) -> Axis | RandomValue:
     """Convert a ``[[vary]]`` table to an axis or distribution; UnitError with the key of an unusable value."""
     path, kind = varied.path, entry["kind"]
-    if kind == "whole_numbers" and path != NOISE_SEED:
+    if kind == "whole_numbers" and not varied.quantity.whole:
         raise UnitError(f"kind = 'whole_numbers' is only for {NOISE_SEED}; use 'choice' or 'uniform'")
-    if path == NOISE_SEED and kind not in ("grid", "list", "choice", "whole_numbers"):
+    if varied.quantity.whole and kind not in ("grid", "list", "choice", "whole_numbers"):
         raise UnitError(f"kind = '{kind}' does not give whole numbers, which '{path}' needs; use 'whole_numbers'")
     if kind in ("list", "choice"):
-        values = _all_whole(path, tuple(_level("values", value, varied) for value in entry["values"]))
+        values = _all_whole(varied, tuple(_level("values", value, varied) for value in entry["values"]))
         return Axis(path, values) if kind == "list" else RandomValue(path, _choice(values, entry.get("weights", ())))
     if kind != "grid":
         return RandomValue(path, distribution_in({"minimum": 0, "maximum": LARGEST_SEED, **entry}, varied))
@@ -151,11 +151,11 @@ def axis_or_distribution(entry: Mapping[str, Any], varied: VariedPath) -> Axis |
     if is_logarithmic and min(first, last) <= 0.0:
         raise UnitError("spacing = 'logarithmic' needs first and last above 0")
     spaced = np.geomspace if is_logarithmic else np.linspace
-    return Axis(path, _all_whole(path, tuple(spaced(first, last, entry["count"]).tolist())))
+    return Axis(path, _all_whole(varied, tuple(spaced(first, last, entry["count"]).tolist())))
 
 
-def _all_whole(path: str, values: tuple[float, ...]) -> tuple[float, ...]:
-    broken = [value for value in values if path == NOISE_SEED and value != math.floor(value)]
+def _all_whole(varied: VariedPath, values: tuple[float, ...]) -> tuple[float, ...]:
+    broken = [value for value in values if varied.quantity.whole and value != math.floor(value)]
     if broken:
         raise UnitError(f"{broken[0]:g} must be a whole number")
     return values

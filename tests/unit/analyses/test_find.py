@@ -119,10 +119,8 @@ def test_runs_that_fail_count_as_not_met_and_are_said(of_curve: Callable[..., Fi
 def test_a_limit_of_valid_values_is_told_from_the_limit_of_the_condition(noise: str) -> None:
     # The set refuses a dynamic friction above the static one, whose value is written in the set.
     static = ppafo.load_device("ppafo2011").friction.static_torque
-    vary, changes = (
-        "friction.dynamic_torque=0.01..4 N m",
-        ["supply.pressure=70 psi_g", f"sensors.pressure_noise={noise}"],
-    )
+    vary = "friction.dynamic_torque=0.01..4 N m"
+    changes = ["supply.pressure=70 psi_g", f"sensors.pressure_noise={noise}"]
     answer = find(TASK, vary=vary, such_that="follows", highest=True, grid=5, overrides=changes)
     assert answer.found.value == pytest.approx(static, rel=1e-3)
     assert "must be at most friction.static_torque = " in answer.found.remarks[0]
@@ -180,6 +178,8 @@ def test_the_value_rests_on_many_noise_streams_and_not_on_the_seed_of_the_scenar
     assert found[0].value / BAR == pytest.approx(5.3 + noise(streams).mean(), abs=8.0 * ACCURACY)
     assert found[1].value == found[0].value
     assert f"it varies by {noise(streams).std(ddof=1):.3g} N m" in found[0].remarks[-1]
+    with pytest.raises(StudyError, match="sensors.seed takes whole numbers alone"):
+        find(TASK, vary="sensors.seed=1..4", such_that="follows")
 
 
 def test_one_instant_of_a_loop_that_oscillates_is_not_met_however_small_its_error_is_there() -> None:

@@ -25,7 +25,7 @@ from ppafo.parameters.overrides import either, in_two_forms
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.contradictions import check_no_bottle, problems_of
 from ppafo.simulation.declaration import WALL_AREA
-from ppafo.simulation.numbers import NOISE_SEED, chosen_path, declared_numbers, moving_together, with_numbers
+from ppafo.simulation.numbers import chosen_path, declared_numbers, moving_together, with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.wording import nearest_name
 
@@ -176,14 +176,12 @@ def _out_of_range(columns: ScenarioColumns, path: str) -> Problem:
         written = f"{path} = {value:.9g} {unit}".rstrip()
         if not np.isfinite(value):
             return f"{written}: must be a finite number"
-        if path == NOISE_SEED and value != np.floor(value):
+        if quantity.whole and value != np.floor(value):
             return f"{written}: must be a whole number"
         return f"{written}: {range_rule(quantity, unit)}"
 
     is_good = np.isfinite(values) & is_within(values, quantity)
-    if path == NOISE_SEED:
-        is_good &= values == np.floor(values)
-    return ~is_good, line
+    return ~(is_good & (values == np.floor(values)) if quantity.whole else is_good), line
 
 
 @dataclass(frozen=True, slots=True)
