@@ -1,6 +1,7 @@
 """Trials of the remedies that a tracking verdict names: further runs, of which the first that follows is reported."""
 
 import contextlib
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -64,7 +65,7 @@ def verdict_of(result: "Result | WalkResult") -> "Tracking":
     except PpafoError:
         return verdict
     strides = "" if _first_strides(scenario) is scenario else f" in the first {_STRIDES_TRIED:.0f} strides"
-    return replace(verdict, tried=_remainder_text(verdict, errors, strides))
+    return replace(verdict, tried=_remainder_text(verdict, errors, strides, scenario.device.shown))
 
 
 def _first_strides(scenario: Scenario) -> Scenario:
@@ -97,19 +98,19 @@ def _trials(scenario: Scenario, verdict: "Tracking", is_of_file: bool) -> "list[
     return trials
 
 
-def _remainder_text(verdict: "Tracking", errors: "list[tuple[Remedy, float]]", strides: str) -> str:
+def _remainder_text(
+    verdict: "Tracking", errors: "list[tuple[Remedy, float]]", strides: str, shown: Mapping[str, str]
+) -> str:
     """Return a sentence on the remedy with the smallest remaining error, or on remedies that do not help.
 
     ``strides`` are words for the part of a walk over which the errors are taken.
     """
     from ppafo.simulation.tracking.remedies import change_text
-    from ppafo.simulation.tracking.verdict import time_text
 
     best, error = min(errors, key=lambda pair: pair[1], default=(None, verdict.error))
     if best is not None and error < _LESS_ERROR * verdict.error:
-        with shown_in(verdict.units):
-            times = time_text(verdict.since, verdict.until)
-            left = f"an RMS error of {change_text(verdict.controlled, error)} is left{times}"
+        with shown_in(shown):
+            left = f"an RMS error of {change_text(verdict.controlled, error)} is left{verdict.when}"
         return f"with {best.text} {left}{strides}, as a further run shows"
     names = ", ".join(dict.fromkeys(each.partition("=")[0] for remedy in verdict.remedies for each in remedy.overrides))
     if not names:

@@ -173,7 +173,7 @@ def test_a_regulator_is_fully_open_where_it_passes_the_flow_of_an_open_one(
 ) -> None:
     scenario = regulated(LOCKED, {**CONSTANT, "command": 0.7}, None, *changes, duration="2 s")
     recording = simulate(scenario).recording
-    is_open = Case(scenario, None, recording, SettledPart(1.0), None).is_fully_open
+    is_open = Case(scenario, recording, SettledPart(1.0), None).is_fully_open
     assert np.mean(is_open[recording.time > 0.5]) == pytest.approx(share, abs=0.01)
 
 
@@ -208,7 +208,7 @@ def test_a_verdict_names_the_number_of_the_regulator_that_is_at_fault(
 @pytest.mark.parametrize(
     ("law", "change", "said"),
     [
-        ("pid_feedforward", "valve.delay=1 ms", "opens a valve for a flow"),
+        ("pid_feedforward", "valve.delay=1 ms", "asks for a flow"),
         ("pid", "valve.highest_pressure=0.01 bar_g", "lowest_pressure = 0.05 bar_g must be below"),
         ("pid", "valve.lowest_pressure=-0.3 bar_g", "lowest_pressure = -0.3 bar_g must be at least supply.atmos"),
         ("pid", "supply.pressure=-0.3 bar_g", "needs a supply above atmospheric pressure"),

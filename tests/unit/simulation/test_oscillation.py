@@ -82,5 +82,5 @@ def test_a_walk_says_it_and_meters_count_what_its_recording_shows() -> None:
         assert (alone.tracking.fails) == (value > 10.0)
     verdict = alone.tracking
     assert verdict.fails
-    assert verdict.per == "stride"
+    assert " a stride of the whole run (" in verdict.found
     assert "; to try, the more promising one first: overrides=['controller.torque_gain=" in verdict.sentence

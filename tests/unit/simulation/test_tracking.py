@@ -481,7 +481,7 @@ def test_a_table_is_judged_by_its_pulses_and_not_by_its_last_rest(duration: str)
     assert simulate(base).tracking.fails
     assert run_judged(base, (), (), None, columns)["follows"].tolist() == [0.0]
     once = load_scenario("torque-task-solenoid", [text.replace("=1.25 s", "=9 s") for text in task])
-    assert (simulate(once).tracking.since, simulate(once).tracking.until) == (0.0, 0.6)
+    assert simulate(once).tracking.when == " from 0 s to 0.6 s"
     assert run_judged(once, (), (), None, columns)["follows"].tolist() == [0.0]
 
 

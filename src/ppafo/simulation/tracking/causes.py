@@ -1,6 +1,6 @@
 """Causes of a task or walk that does not follow its reference, most certain first, with numbers and remedies."""
 
-from collections.abc import Callable
+from collections.abc import Iterable, Iterator
 from functools import partial
 
 import numpy as np
@@ -14,13 +14,13 @@ from ppafo.metrics.switching import SHUT
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, error_functions
 from ppafo.parameters.graph import Asked
 from ppafo.parameters.reach import supply_for
-from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.gains import loop_of
 from ppafo.simulation.numbers import declared_numbers, number_at, with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.torque_loop import LoopParts, quicker_at
-from ppafo.simulation.tracking.case import Case, TrackingCause, only_opens_fully
+from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.load_causes import (
+    ACTS_ONE_WAY,
     ONE_WAY,
     below_lowest_set_pressure,
     flung_at_start,
@@ -33,16 +33,16 @@ from ppafo.simulation.tracking.load_causes import (
 )
 from ppafo.simulation.tracking.remedies import (
     CASCADE,
+    Change,
     Remedy,
     change_text,
     dead_band,
-    default_gain_remedies,
-    default_integral_remedy,
+    default_gains,
+    default_integral,
     level_text,
-    remedy,
+    own_settings,
     rescaled_gains,
     sized_valves,
-    smaller_pair,
     speed_settings,
     stated_number,
     stiffened,
@@ -59,6 +59,8 @@ _FINE = 0.1
 """Step of an on/off valve during its dead time divided by the wanted change, up to which it makes no loop fail [-]."""
 _SMALL_STEP = 0.25
 """Step of an on/off valve during its dead time divided by the swing, below which the swing is not the valve's [-]."""
+_STEPS_OF_PAIR = (0.2, 0.3, 0.4, 0.5, 0.6, 0.1)
+"""Steps of a pair during its dead time divided by the wanted change, aimed at with smaller orifices [-]."""
 _NARROWER = (2.0, 5.0, 20.0)
 """Factors by which the dead zone of an on/off law is reduced in a trial [-]."""
 _EDGE = 1.05
@@ -102,9 +104,8 @@ _DORSIFLEXION = ("landing_peak_torque", "swing_peak_torque", "hold_stiffness", "
 
 def _slope(case: Case) -> Floats:
     """Rate of the reference in the settled part [SI/s]; none at rest, of a pair, or for a move of one sample."""
-    reference, time = followed(case.recording)[0][case.samples], case.recording.time[case.samples]
-    moves = reference.size > 1 and not case.settled.rests and not case.only_switches
-    return np.gradient(reference, time) if moves else np.zeros(reference.size)
+    moves = case.reference.size > 1 and not case.settled.rests and not case.only_switches
+    return np.gradient(case.reference, case.recording.time[case.samples]) if moves else np.zeros(case.reference.size)
 
 
 def _late_device(case: Case, least: float = LARGEST_SHARE) -> TrackingCause | None:
@@ -113,96 +114,94 @@ def _late_device(case: Case, least: float = LARGEST_SHARE) -> TrackingCause | No
     In the dead time a reference moves by more than a share ``least`` of the wanted change, or one at rest is judged for
     few dead times only.
     """
-    scenario, law, settled = case.scenario, case.law, case.settled
-    period, valve = scenario.controller.period, scenario.device.valve.settings
-    saved = {"controller.rate": SAMPLES_LATE * period}
+    scenario, settled, period = case.scenario, case.settled, case.scenario.controller.period
+    saved, valve = {"controller.rate": SAMPLES_LATE * period}, case.device.valve.settings
     # The valves of an on/off law, and the gains of a Python object, have causes of their own.
-    has_loop = law is not None and not case.only_switches
-    dead_time = loop_of(scenario, law).dead_time if law is not None and has_loop else saved["controller.rate"]
+    law = None if case.only_switches else case.law
+    dead_time = saved["controller.rate"] if law is None else loop_of(scenario, law).dead_time
     moves = float(np.sqrt(np.mean(_slope(case) ** 2))) * dead_time
     if moves <= least * settled.wanted_change and not (settled.rests and dead_time > least * settled.duration):
         return None
     quicker = {
         f"valve.{name}": [float(valve[name]) * factor**power for factor in _QUICKER_DEVICE]
         for name, power in _DELAYS_OF_VALVE.items()
-        if has_loop and valve.get(name, 0.0) > 0.0
+        if law is not None and valve.get(name, 0.0) > 0.0
     }
-    if law is not None:
-        trials = {path: loop_of(with_numbers(scenario, {path: numbers[-1]}), law) for path, numbers in quicker.items()}
-        saved |= {path: dead_time - loop.dead_time for path, loop in trials.items()}
+    for path, numbers in quicker.items():
+        assert law is not None, "only these laws have a loop"
+        saved[path] = dead_time - loop_of(with_numbers(scenario, {path: numbers[-1]}), law).dead_time
     path = max(saved, key=saved.__getitem__)
-    if path in quicker:
-        stated = stated_number(scenario, path)
-        remedies = tuple(remedy(scenario, {path: each}) for each in quicker[path])
-    else:
+    remedies: list[Change | Remedy] = [{path: number} for number in quicker.get(path, ())]
+    stated = stated_number(scenario, path) if path in quicker else f"`{path} = {1.0 / period:.4g} Hz`"
+    if path not in quicker:
         rates = [rate for rate in dict.fromkeys((10.0 / period, 100.0 / period, _USUAL_RATE)) if rate <= _USUAL_RATE]
-        stated = f"`{path} = {1.0 / period:.4g} Hz`"
-        remedies = tuple(Remedy({}, (f"controller.rate={rate:g} Hz",)) for rate in rates if rate * period > 1.0)
+        remedies += [Remedy({}, (f"controller.rate={rate:g} Hz",)) for rate in rates if rate * period > 1.0]
     moved = f", in which the reference moves by {change_text(scenario.controlled, moves)}" * (moves > 0.0)
     text = f"{stated} gives most of the loop's dead time of {level_text('s', dead_time)}{moved}"
-    return TrackingCause(text, remedies, "use a faster valve or controller, or a slower reference")
+    return case.cause(text, remedies, "use a faster valve or controller, or a slower reference")
 
 
 def _shut_valve(case: Case) -> TrackingCause | None:
     """Cause: the command is 0, or stays within the dead band of the valve."""
     scenario, settled = case.scenario, case.settled
     reverses = settled.error_reversals > MOST_REVERSALS
-    command, band = np.abs(case.recording["command"][case.samples]), dead_band(scenario)
+    command, band = np.abs(case.channel("command")), dead_band(scenario)
     # A loop that rests at the edge of the band is a little beyond it now and then.
     typical = float(np.max(command)) if np.mean(command <= _EDGE * band) < _MOSTLY else float(np.median(command))
-    if case.failure != "overshoots" and (np.max(command) if reverses else typical) <= SHUT:
+    if case.overshoots:
+        return None
+    if (np.max(command) if reverses else typical) <= SHUT:
         return TrackingCause("the command stays 0: the gains are 0, or the dead zone is wider than the error")
-    if typical > _EDGE * band or reverses or case.failure == "overshoots":
-        return None
     known_band = float(scenario.controller.settings.get("dead_band", 0.0))
-    if known_band >= band and case.is_settling:
+    if typical > _EDGE * band or reverses or (known_band >= band and case.is_settling):
         return None
-    remedies = [remedy(scenario, {"controller.dead_band": band})] if known_band < band else []
+    is_unknown = known_band < band
     # A law that knows the band asks for more openings than it gets, and errs by what its gain lacks.
-    gain_factor = band / typical if known_band < band else settled.rms_error / (LARGEST_SHARE * settled.wanted_change)
-    remedies += rescaled_gains(scenario, case.law, (1.5 * gain_factor, 3.0 * gain_factor))
-    remedies += default_integral_remedy(scenario, case.law)
-    if torque_asked(scenario, case.law, settled.rms_error) is not None:
-        remedies += stiffer_laws(scenario, float(scenario.device.friction.static_torque), settled)
-    relation = "stays within" if known_band < band else "hardly opens the valve beyond"
+    factor = band / typical if is_unknown else settled.rms_error / (LARGEST_SHARE * settled.wanted_change)
+    changes: list[Change] = [{"controller.dead_band": band}] if is_unknown else []
+    changes += rescaled_gains(scenario, 1.5 * factor, 3.0 * factor) + default_integral(scenario)
+    if torque_asked(scenario, settled.rms_error) is not None:
+        changes += stiffer_laws(scenario, float(case.device.friction.static_torque), settled)
+    relation = "stays within" if is_unknown else "hardly opens the valve beyond"
     text = f"the command of {typical:.2g} {relation} `valve.dead_band = {band:.2g}`"
-    return TrackingCause(text, tuple(remedies), "give a larger gain")
+    return case.cause(text, changes, "give a larger gain")
 
 
 def _oscillation(case: Case) -> TrackingCause | None:
     """Cause: valves, gains or small chambers make the loop oscillate."""
-    law, scenario = case.law, case.scenario
-    names = [quantity.name for quantity in speed_settings(scenario, law).values()]
-    may_be_late = scenario.follows_reference and only_opens_fully(case.recording) and not names
+    law, scenario, settled = case.law, case.scenario, case.settled
+    gain = next((quantity.name for quantity in speed_settings(scenario).values()), "")
+    may_be_late = scenario.follows_reference and case.opens_fully_alone and not gain
     late, delay = "", float(scenario.sensors.delay)
     if may_be_late:
-        reference, value = followed(case.recording)
-        crossings = int(np.count_nonzero(np.diff((value > reference)[case.samples])))
-        if delay * max(crossings, 1) > _LONG_DELAY * case.settled.duration:
-            late = (
-                f"the measured {CONTROLLED[scenario.controlled].words} comes late ({stated_number(scenario, _DELAY)})"
-            )
+        crossings = int(np.count_nonzero(np.diff(case.error > 0.0)))
+        late = _late_measurement(case) * (delay * max(crossings, 1) > _LONG_DELAY * settled.duration)
     if not (case.oscillates or case.only_switches or late):
         return None
     if law is not None and case.only_switches:
         return _step_of_valves(case, law)
     # Valves that a Python object opens fully alone act as under the shipped on/off law.
     shipped = CONTROLLERS["on_off"] if law is None and may_be_late and not late else None
-    if shipped is not None and _pair_step(case, shipped)[0] > _FINE * case.settled.wanted_change:
+    if shipped is not None and _pair_step(case, shipped)[0] > _FINE * settled.wanted_change:
         return _step_of_valves(case, shipped)
-    if law is not None and names:
-        return _gains_of_another_device(case) or _fast_loop(case, law, names[0])
+    if gain:
+        return _gains_of_another_device(case) or _fast_loop(case, gain)
     name = "the user-defined controller" if law is None else f"`{law.name}`"
-    if not only_opens_fully(case.recording):
+    if not case.opens_fully_alone:
         return TrackingCause(f"{name} is too fast for the delays of the loop", (), "reduce its gains, or slow it down")
-    quicker = f"reduce `{_DELAY}`, " * bool(late) + "increase `controller.rate`, " * (
-        scenario.controller.period >= _SLOW
-    )
-    zone = change_text(scenario.controlled, LARGEST_SHARE * case.settled.wanted_change)
+    quicker = f"reduce `{_DELAY}`, " * bool(late)
+    quicker += "increase `controller.rate`, " * (scenario.controller.period >= _SLOW)
+    zone = change_text(scenario.controlled, LARGEST_SHARE * settled.wanted_change)
     declaration = ", or give it hysteresis and only_switches=True in its ControllerKind" * (law is not None)
     advice = f"{quicker}let it command 0 within a dead zone below {zone} about its reference{declaration}"
     reason = late or "reverses them without pause"
     return TrackingCause(f"{name} commands only full openings, and {reason}", (), advice)
+
+
+def _late_measurement(case: Case) -> str:
+    """Clause on the delay of the sensors."""
+    stated = stated_number(case.scenario, _DELAY)
+    return f"the measured {CONTROLLED[case.scenario.controlled].words} comes late ({stated})"
 
 
 def _step_of_valves(case: Case, law: ControllerKind) -> TrackingCause | None:
@@ -225,40 +224,39 @@ def _step_of_valves(case: Case, law: ControllerKind) -> TrackingCause | None:
     sampled = SAMPLES_LATE * scenario.controller.period
     quicker = "a faster valve" if sampled <= 0.5 * dead_time else "a higher `controller.rate`"
     if is_pair(scenario):
-        is_late = sampled > float(scenario.device.valve.settings["switching_interval"])
+        is_late = sampled > float(case.device.valve.settings["switching_interval"])
         quicker = "faster valves" + " together with a higher `controller.rate`" * is_late
+    smaller = sized_valves(scenario, *(share / ratio for share in _STEPS_OF_PAIR if share < ratio))
     # Where a valve has gradual openings, a law that uses them for an angle is the better remedy.
     gradual = (CASCADE,) if scenario.controlled == ANGLE else ()
-    return TrackingCause(text, (*gradual, *smaller_pair(scenario, ratio)), f"take smaller valves, or {quicker}")
+    return case.cause(text, (*gradual, *smaller), f"take smaller valves, or {quicker}")
 
 
 def _pair_step(case: Case, law: ControllerKind) -> tuple[float, float]:
     """Step R theta of on/off valves [SI] at the mean angle of the settled part, in their dead time theta [s]."""
-    loop, angle = loop_of(case.scenario, law), float(np.mean(case.recording["angle"][case.samples]))
+    loop, angle = loop_of(case.scenario, law), float(np.mean(case.channel("angle")))
     return loop.rate * loop.dead_time * _loop_rate(case.scenario, angle), loop.dead_time
 
 
 def _wide_zone(case: Case, begin: str, end: str = "") -> TrackingCause:
     """Cause: dead zone or hysteresis of an on/off law is too wide; the text names the settings, between two parts."""
     scenario, unit = case.scenario, CONTROLLED[case.scenario.controlled].difference
-    widths = {
-        item.name: float(scenario.controller.settings[item.name])
-        for item in (law_settings(case.law, scenario.controlled) if case.law is not None else ())
-        if item.unit == unit and scenario.controller.settings[item.name] > 0.0
-    }
+    settings = scenario.controller.settings
+    found = {item.name: float(settings[item.name]) for item in own_settings(scenario) if item.unit == unit}
+    widths = {name: width for name, width in found.items() if width > 0.0}
     own = ", ".join(f"`{name} = {change_text(scenario.controlled, width)}`" for name, width in widths.items())
-    text = f"{begin}{own and f' ({own})'}{end}"
-    narrower = [{f"controller.{name}": width / factor for name, width in widths.items()} for factor in _NARROWER]
-    smaller = [remedy(scenario, numbers) for numbers in narrower if numbers]
-    return TrackingCause(text, tuple(smaller), "change the settings or the rule of the controller")
+    narrower = [{f"controller.{name}": width / by for name, width in widths.items()} for by in _NARROWER if widths]
+    return case.cause(
+        f"{begin}{own and f' ({own})'}{end}", narrower, "change the settings or the rule of the controller"
+    )
 
 
-def _fast_loop(case: Case, law: ControllerKind, gain: str) -> TrackingCause:
+def _fast_loop(case: Case, gain: str) -> TrackingCause:
     """Cause: a default gain is too large for delays, noise, motion of the joint, or chambers that are small there."""
-    scenario, sensors, angle = case.scenario, case.scenario.sensors, case.recording["angle"][case.samples]
+    scenario, sensors, angle = case.scenario, case.scenario.sensors, case.channel("angle")
     # A joint that moves far oscillates where its loop is fastest, near a stop.
     rates = [(_loop_rate(scenario, float(each)), float(each)) for each in (angle.mean(), angle.min(), angle.max())]
-    (rate, fastest), softer = max(rates), stiffened(scenario, (0.5, 0.25))
+    (rate, fastest), softer = max(rates), stiffened(scenario, 0.5, 0.25)
     if rate > _QUICKER:
         text = (
             f"at {level_text('rad', fastest)} the chambers are so small that the loop is {rate:.2g} times "
@@ -266,20 +264,19 @@ def _fast_loop(case: Case, law: ControllerKind, gain: str) -> TrackingCause:
         )
         # Near a stop for a part of the time, a loop needs no gain for that angle throughout.
         factors = (rate, 2.0 * rate) if rate == rates[0][0] else (2.0, 4.0, rate)
-        return TrackingCause(text, (*rescaled_gains(scenario, law, (1.0 / factor for factor in factors)), *softer))
-    if sensors.angle_noise or sensors.pressure_noise:
-        noise = f"{change_text(ANGLE, sensors.angle_noise)} and {change_text('pressure_1', sensors.pressure_noise)}"
-        reason = f"sensor noise ({noise}) reverses the command"
-    elif any(scenario.device.valve.settings.get(name, 0.0) > 0.0 for name in _FLAWS_OF_VALVE[2]):
-        reason = "it includes neither hysteresis nor resolution of the valve"
-    elif sensors.delay or scenario.supply_lines is not None:
-        reason = "the delay of sensors or supply lines causes it"
-    elif np.ptp(angle) > _MOVING:
-        reason = "it is computed at constant volume and without load, but the joint moves"
-    else:
-        reason = "the loop has delays that this gain does not include"
+        return case.cause(text, (*rescaled_gains(scenario, *(1.0 / factor for factor in factors)), *softer))
+    noise = f"{change_text(ANGLE, sensors.angle_noise)} and {change_text('pressure_1', sensors.pressure_noise)}"
+    flaws = [case.device.valve.settings.get(name, 0.0) for name in _FLAWS_OF_VALVE[2]]
+    reasons = {
+        f"sensor noise ({noise}) reverses the command": sensors.angle_noise or sensors.pressure_noise,
+        "it includes neither hysteresis nor resolution of the valve": max(flaws) > 0.0,
+        "the delay of sensors or supply lines causes it": sensors.delay or scenario.supply_lines is not None,
+        "it is computed at constant volume and without load, but the joint moves": np.ptp(angle) > _MOVING,
+        "the loop has delays that this gain does not include": True,
+    }
+    reason = next(text for text, is_so in reasons.items() if is_so)
     text = f"`{gain}` is about the gain computed for this device: {reason}"
-    return TrackingCause(text, (*rescaled_gains(scenario, law, (0.5, 0.25)), *softer))
+    return case.cause(text, (*rescaled_gains(scenario, 0.5, 0.25), *softer))
 
 
 def _loop_rate(scenario: Scenario, angle: float) -> float:
@@ -290,82 +287,61 @@ def _loop_rate(scenario: Scenario, angle: float) -> float:
 
 def _static_friction(case: Case) -> TrackingCause | None:
     """Cause: static friction, with the valve's dead band, holds the joint at rest off its reference."""
-    scenario, settled = case.scenario, case.settled
-    settings, holding = scenario.controller.settings, float(scenario.device.friction.static_torque)
-    requested = torque_asked(scenario, case.law, settled.rms_error)
-    gain = float(settings.get("torque_gain", 0.0))
-    if requested is None or gain == 0.0:
-        return None
+    scenario, settled, settings = case.scenario, case.settled, case.scenario.controller.settings
+    requested, gain = torque_asked(scenario, settled.rms_error), float(settings.get("torque_gain", 0.0))
     # Friction holds a joint still: it neither overshoots nor swings.
-    if case.failure == "overshoots" or (settled.rests and settled.error_deviation > abs(settled.mean_error)):
+    swings = case.overshoots or (settled.rests and settled.error_deviation > abs(settled.mean_error))
+    if requested is None or gain == 0.0 or swings:
         return None
     # A torque that creeps up while the joint rests is asked for beside the stiffness.
-    known_friction = float(settings.get("static_torque", 0.0))
+    known_friction, holding = float(settings.get("static_torque", 0.0)), float(case.device.friction.static_torque)
     requested += known_friction
     # The law believes in a dead band, and jumps over that.
-    band = max(dead_band(scenario) - float(settings.get("dead_band", 0.0)), 0.0)
-    lost = band / gain
+    lost = max(dead_band(scenario) - float(settings.get("dead_band", 0.0)), 0.0) / gain
     if requested > holding + lost:
         return None
-    holding_text, requested_text = level_text("N m", holding), level_text("N m", requested)
     band_text = f" and `valve.dead_band` costs {level_text('N m', lost)}" if requested > holding else ""
     text = (
-        f"static friction holds the joint with {holding_text}{band_text}, but the controller requests only "
-        f"{requested_text} at this error"
+        f"static friction holds the joint with {level_text('N m', holding)}{band_text}, but the controller requests "
+        f"only {level_text('N m', requested)} at this error"
     )
     is_too_low = "static_torque" in settings and known_friction < holding
-    remedies = [remedy(scenario, {"controller.static_torque": holding})] if is_too_low else []
-    remedies += stiffer_laws(scenario, holding, settled)
-    return TrackingCause(text, tuple(remedies), "increase `controller.angle_stiffness`")
-
-
-def _open_share(case: Case) -> float:
-    """Share of the settled part in which the valve is fully open [-]."""
-    return float(np.mean(case.is_fully_open[case.samples]))
+    changes: list[Change] = [{"controller.static_torque": holding}] if is_too_low else []
+    changes += stiffer_laws(scenario, holding, settled)
+    return case.cause(text, changes, "increase `controller.angle_stiffness`")
 
 
 def _small_valve(case: Case) -> TrackingCause | None:
     """Cause: the valve is fully open for much of the settled part, and too small for this task."""
-    scenario, settled, share = case.scenario, case.settled, _open_share(case)
+    scenario, settled, share = case.scenario, case.settled, case.open_share
     if share <= (_MOSTLY if settled.rests or case.oscillates else _PARTLY) or case.is_for_reach:
         return None
     # A valve larger by wanted over reached change gives the wanted change in the same time.
-    missing = min(settled.wanted_change / max(settled.value_range, _TINY), _LARGEST_FACTOR)
-    factors = sorted({3.0, 10.0, *(times * max(missing, 1.0) for times in _LARGER_VALVES)} - {1.0})
-    larger = sized_valves(scenario, factors)
+    missing = max(min(settled.wanted_change / max(settled.value_range, _TINY), _LARGEST_FACTOR), 1.0)
+    larger = sized_valves(scenario, *sorted({3.0, 10.0, *(times * missing for times in _LARGER_VALVES)} - {1.0}))
     # A reference beyond reach needs both, unless it lies there on purpose.
     beyond = None if scenario.beyond_reach else torque_beyond_reach(case)
-    both = [
-        remedy(scenario, {**valve.numbers, **within.numbers})
-        for within in (beyond.remedies[:2] if beyond is not None else ())
-        for valve in larger[-3:]
-    ]
+    within = () if beyond is None else beyond.remedies[:2]
+    both = [{**valve, **each.numbers} for each in within for valve in larger[-3:]]
     also = "" if beyond is None else f"; {beyond.text}"
-    text = f"the valve is fully open for {100.0 * share:.0f} % of the time: it is too small for this task{also}"
-    advice = "use a larger valve or a slower reference"
-    return TrackingCause(text, tuple(both) or larger, advice)
+    return case.cause(
+        f"{_fully_open(case)} this task{also}", both or larger, "use a larger valve or a slower reference"
+    )
 
 
-def _within_tolerance(case: Case) -> TrackingCause | None:
-    """Cause: an angle controller accepts a larger error at rest than the verdict does."""
-    scenario, settled = case.scenario, case.settled
-    accepted, allowed = scenario.controller.settings.get("tolerance", 0.0), LARGEST_SHARE * settled.wanted_change
-    if not settled.rests or case.oscillates or not allowed < abs(settled.mean_error) <= accepted:
-        return None
-    text = f"the controller accepts an error of `controller.tolerance = {level_text('rad', accepted)}`"
-    numbers = [{"controller.tolerance": share * allowed} for share in (0.9, 0.5, 0.2)]
-    return TrackingCause(text, (*(remedy(scenario, each) for each in numbers), *stiffened(scenario, (2.0, 4.0))))
+def _fully_open(case: Case) -> str:
+    """Clause on a valve that is too small."""
+    return f"the valve is fully open for {100.0 * case.open_share:.0f} % of the time: it is too small for"
 
 
 def _opened_away(case: Case) -> TrackingCause | None:
     """Cause: the valve is fully open for most of the settled part, away from the reference."""
     scenario, samples, is_open = case.scenario, case.samples, case.is_fully_open
-    share = np.mean(is_open[samples])
-    if share <= _MOSTLY:
+    if case.open_share <= _MOSTLY:
         return None
     reference, value = followed(case.recording)
     # Sign of the command that reduces a positive error.
-    upwards = error_functions(scenario.controlled, scenario.device.supply.is_vacuum).steered(1.0)
+    upwards = error_functions(scenario.controlled, case.device.supply.is_vacuum).steered(1.0)
     command = upwards * case.recording["command"]
     is_away = np.asarray(command * (reference - value) < 0.0)
     away = np.mean(is_away[samples][is_open[samples]])
@@ -375,12 +351,12 @@ def _opened_away(case: Case) -> TrackingCause | None:
     measured = np.interp(time - float(scenario.sensors.delay), time, value)
     if away > _MOSTLY and np.mean((command * (reference - measured))[begins] < 0.0) > _ALWAYS:
         text = (
-            f"the valve is fully open for {100.0 * share:.0f} % of the time, and drives away from the reference for "
-            f"{100.0 * away:.0f} % of this time"
+            f"the valve is fully open for {100.0 * case.open_share:.0f} % of the time, and drives away from the "
+            f"reference for {100.0 * away:.0f} % of this time"
         )
         return TrackingCause(text, (), "reverse the sign of the command or of the measurement")
     is_gradual = case.law is not None and not case.only_switches
-    if is_gradual or away <= _ALWAYS or begins[samples].any() or not only_opens_fully(case.recording):
+    if is_gradual or away <= _ALWAYS or begins[samples].any() or not case.opens_fully_alone:
         return None
     worst = change_text(scenario.controlled, case.settled.largest_error)
     opened = f"the valve stays open {worst} beyond the reference: the hysteresis of the controller"
@@ -389,238 +365,192 @@ def _opened_away(case: Case) -> TrackingCause | None:
 
 def _lag(case: Case) -> TrackingCause | None:
     """Cause: the reference moves faster than the loop follows; states the lag if it explains the error."""
-    scenario, samples = case.scenario, case.samples
-    reference, value = (series[samples] for series in followed(case.recording))
-    slope, error = _slope(case), reference - value
-    squares = float(np.mean(slope**2))
+    scenario, slope = case.scenario, _slope(case)
+    squares, late = float(np.mean(slope**2)), _late_device(case)
     if squares == 0.0:
         return None
-    delay = float(np.mean(slope * error)) / squares
-    text = "the reference changes faster than the loop can follow"
-    late = _late_device(case)
+    delay = float(np.mean(slope * -case.error)) / squares
+    text = "the reference changes faster than the loop can follow" if late is None else late.text
     if delay > 0.0 and delay**2 * squares >= _EXPLAINED * case.settled.rms_error**2:
         text = f"it lags its reference by {1.0e3 * delay:.3g} ms"
-    elif late is not None:
-        text = late.text
-    remedies = [*stiffened(scenario, (2.0, 4.0)), *rescaled_gains(scenario, case.law, (2.0, 4.0))]
+    remedies: list[Change | Remedy] = [*stiffened(scenario, 2.0, 4.0), *rescaled_gains(scenario, 2.0, 4.0)]
     remedies += () if late is None else late.remedies
     frequency = float(scenario.reference.settings.get("frequency", 0.0))
     for share in _SLOWER if frequency else ():
-        slower = {"reference.frequency": share * frequency}
         # The judged half of a run shows a period of the slower reference.
-        if share * case.settled.reference_periods < 1.0:
-            slower["run.duration"] = 2.0 / (share * frequency)
-        remedies.append(remedy(scenario, slower))
-    return TrackingCause(text, tuple(remedies), "use larger gains, less delay or a slower reference")
+        is_short = share * case.settled.reference_periods < 1.0
+        longer = {"run.duration": 2.0 / (share * frequency)} if is_short else {}
+        remedies.append({"reference.frequency": share * frequency, **longer})
+    return case.cause(text, remedies, "use larger gains, less delay or a slower reference")
 
 
 def _gains_of_another_device(case: Case) -> TrackingCause | None:
     """Cause: a gain differs from the default gain of the device."""
-    default_gains = default_gain_remedies(case.scenario, case.law)
-    if not default_gains:
+    defaults = default_gains(case.scenario)
+    if not defaults:
         return None
+    # Without its integral a loop rests beside its reference with any gain.
+    others = default_integral(case.scenario)
     if case.oscillates:
         # Where the default gains oscillate as well, or lag, gains of half or twice their speed may follow.
-        numbers = default_gains[-1].numbers
-        rescaled = rescaled_gains(with_numbers(case.scenario, numbers), case.law, (2.0, 0.5))
-        others = [remedy(case.scenario, {**numbers, **each.numbers}) for each in rescaled]
-    else:
-        # Without its integral a loop rests beside its reference with any gain.
-        others = default_integral_remedy(case.scenario, case.law)
-    return TrackingCause("the gains do not suit this device", (*default_gains, *others))
+        others = [
+            {**defaults[-1], **each} for each in rescaled_gains(with_numbers(case.scenario, defaults[-1]), 2.0, 0.5)
+        ]
+    return case.cause("the gains do not suit this device", (*defaults, *others))
 
 
-def _poor_sensors(case: Case) -> TrackingCause | None:
-    """Cause: delay, noise or resolution of the sensors; less certain than a cause within the loop."""
-    scenario, declared = case.scenario, declared_numbers(case.scenario)
-    flaws = {path: number_at(scenario, path) for path in _SENSOR_FLAWS if path in declared}
-    found = {path: number for path, number in flaws.items() if number > 0.0}
-    if not found:
-        return None
-    # Gains are changed with less effort than sensors.
-    remedies = [*rescaled_gains(scenario, case.law, (0.5,))]
-    remedies += [remedy(scenario, {path: number / factor}) for path, number in found.items() for factor in _LESS]
-    stated = [stated_number(scenario, path) for path in found]
-    late = (
-        f"the measured {CONTROLLED[scenario.controlled].words} comes late ({stated.pop(0)})" if _DELAY in found else ""
-    )
-    others = f"the sensors are not accurate enough for the controlled quantity ({', '.join(stated)})" if stated else ""
-    return TrackingCause(", and ".join(filter(None, (late, others))), tuple(remedies))
-
-
-def _flaw_of_valve(names: tuple[str, ...], oscillates: bool, case: Case) -> TrackingCause | None:
-    """Cause: numbers of a regulator that keep its set pressure off the command, for a loop that oscillates or not."""
-    scenario, declared = case.scenario, declared_numbers(case.scenario)
-    numbers = {path: number_at(scenario, path) for path in (f"valve.{name}" for name in names) if path in declared}
-    if case.oscillates != oscillates or len(numbers) < len(names) or not min(numbers.values()) > 0.0:
-        return None
-    stated = " and ".join(stated_number(scenario, path) for path in numbers)
-    smaller = [{path: number / factor for path, number in numbers.items()} for factor in _QUICKER_DEVICE[:2]]
-    remedies = tuple(remedy(scenario, each) for each in smaller)
-    return TrackingCause(f"the set pressure is kept off the command by {stated}", remedies)
-
-
-def _law_without_torque_loop(case: Case) -> TrackingCause | None:
-    """Cause: an angle controller without inner torque loop, slow because the gas spring swings the joint."""
-    scenario, law, error = case.scenario, case.law, case.settled.rms_error
-    is_other = scenario.controlled != ANGLE or torque_asked(scenario, law, error) is not None
-    if is_other or law is None or law.only_switches:
-        return None
-    text = f"`{law.name}` controls the angle without an inner torque loop and is slow against load and friction"
-    return TrackingCause(text, (CASCADE,))
-
-
-def _still_approaching(case: Case) -> TrackingCause | None:
-    """Cause: a loop that neither swings nor rests needs longer than its reference rests, or larger gains."""
-    if case.failure != "does not follow" or not case.is_approaching:
-        return None
-    scenario, limit = case.scenario, float(case.scenario.controller.settings.get("error_limit", 0.0))
-    remedies = [remedy(scenario, {"controller.error_limit": factor * limit}) for factor in (2.0, 4.0) if limit > 0.0]
-    remedies += [remedy(scenario, {"run.duration": factor * scenario.run.duration}) for factor in (2.0, 4.0)]
-    remedies += rescaled_gains(scenario, case.law, (2.0, 4.0))
-    text = f"it is still on its way at the end, {case.settled.duration:.3g} s later"
-    return TrackingCause(text, tuple(remedies), "let the reference rest longer, or use larger gains")
+def _numbers_above_0(scenario: Scenario, paths: Iterable[str]) -> dict[str, float]:
+    """Return the numbers at some paths that the scenario has and that are not 0 [SI]."""
+    declared = declared_numbers(scenario)
+    numbers = {path: number_at(scenario, path) for path in paths if path in declared}
+    return {path: number for path, number in numbers.items() if number > 0.0}
 
 
 def _not_settled(case: Case) -> TrackingCause:
     """Cause: the run ends before the loop settles, the integral gain is 0, or no other cause applies."""
-    settings = case.scenario.controller.settings
-    stop = stop_of(case.scenario, case.recording["angle"][case.samples])
-    if stop and case.scenario.controlled == ANGLE:
+    scenario, settings = case.scenario, case.scenario.controller.settings
+    stop = stop_of(scenario, case.channel("angle"))
+    if stop and scenario.controlled == ANGLE:
         return TrackingCause(f"the joint lies on its {stop} stop", (), "check the load that moves it there")
     if case.is_settling:
-        longer = [remedy(case.scenario, {"run.duration": times * case.scenario.run.duration}) for times in (2.0, 4.0)]
+        longer = [{"run.duration": times * scenario.run.duration} for times in (2.0, 4.0)]
         text = f"it has not settled by {case.settled.start:.3g} s"
-        return TrackingCause(
-            text, (*longer, *rescaled_gains(case.scenario, case.law, (2.0, 4.0))), "increase `run.duration`"
-        )
-    integral = next((name for name in settings if "integral" in name and settings[name] == 0.0), "")
-    if integral:
-        remedies = tuple(default_integral_remedy(case.scenario, case.law))
+        return case.cause(text, (*longer, *rescaled_gains(scenario, 2.0, 4.0)), "increase `run.duration`")
+    if integral := next((name for name in settings if "integral" in name and settings[name] == 0.0), ""):
         text = "the remaining error needs integral action, whose gain is 0"
-        return TrackingCause(text, remedies, f"set `{integral}` above 0")
+        return case.cause(text, default_integral(scenario), f"set `{integral}` above 0")
     return TrackingCause("torque limit, dead band, friction and opening do not explain the error", (), "see the figure")
 
 
-CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
-    _opened_away,
-    # A larger lack than the reach explains has another cause before it.
-    lambda case: torque_beyond_reach(case) if case.is_for_reach else None,
-    load_beyond_reach,
-    below_lowest_set_pressure,
-    flung_at_start,
-    # No gains follow what moves on in the dead time by more than any lag that is allowed.
-    lambda case: _late_device(case, LARGEST_LAG),
-    torque_at_its_limit,
-    _within_tolerance,
-    _static_friction,
-    _shut_valve,
-    _oscillation,
-    _small_valve,
-    torque_beyond_reach,
-    _gains_of_another_device,
-    _lag,
-    _still_approaching,
-    _law_without_torque_loop,
-    _late_device,
-    # Of a loop that does not oscillate, these are less certain than any other cause.
-    *(partial(_flaw_of_valve, names, True) for names in _FLAWS_OF_VALVE),
-    _poor_sensors,
-    _not_settled,
-    *(partial(_flaw_of_valve, names, False) for names in _FLAWS_OF_VALVE),
-)
-"""Causes of a task, most certain first; ``_not_settled`` always applies."""
+def _of_sensors(case: Case) -> Iterator[TrackingCause]:
+    """Yield the cause of delay, noise or resolution of the sensors, if any."""
+    found = _numbers_above_0(case.scenario, _SENSOR_FLAWS)
+    # Gains are changed with less effort than sensors.
+    less = [{path: number / factor} for path, number in found.items() for factor in _LESS]
+    stated = ", ".join(stated_number(case.scenario, path) for path in found if path != _DELAY)
+    others = f"the sensors are not accurate enough for the controlled quantity ({stated})" if stated else ""
+    if text := ", and ".join(filter(None, (_late_measurement(case) if _DELAY in found else "", others))):
+        yield case.cause(text, (*rescaled_gains(case.scenario, 0.5), *less))
+
+
+def _of_regulator(case: Case) -> Iterator[TrackingCause]:
+    """Yield the causes of numbers of a regulator that keep its set pressure off the command."""
+    for names in _FLAWS_OF_VALVE:
+        numbers = _numbers_above_0(case.scenario, [f"valve.{name}" for name in names])
+        if len(numbers) == len(names):
+            stated = " and ".join(stated_number(case.scenario, path) for path in numbers)
+            smaller = [{path: number / by for path, number in numbers.items()} for by in _QUICKER_DEVICE[:2]]
+            yield case.cause(f"the set pressure is kept off the command by {stated}", smaller)
+
+
+def causes_of_task(case: Case) -> Iterator[TrackingCause]:
+    """Yield the causes of a task that does not follow its reference, most certain first, and at least one."""
+    scenario, settled, law, settings = case.scenario, case.settled, case.law, case.scenario.controller.settings
+    beyond = torque_beyond_reach(case)
+    outside = (
+        _opened_away(case),
+        # A larger lack than the reach explains has another cause before it.
+        beyond if case.is_for_reach else None,
+        load_beyond_reach(case),
+        below_lowest_set_pressure(case),
+        flung_at_start(case),
+        # No gains follow what moves on in the dead time by more than any lag that is allowed.
+        _late_device(case, LARGEST_LAG),
+        torque_at_its_limit(case),
+    )
+    yield from filter(None, outside)
+    # An angle controller may accept a larger error at rest than the verdict does.
+    accepted, allowed = settings.get("tolerance", 0.0), LARGEST_SHARE * settled.wanted_change
+    if settled.rests and not case.oscillates and allowed < abs(settled.mean_error) <= accepted:
+        text = f"the controller accepts an error of `controller.tolerance = {level_text('rad', accepted)}`"
+        stricter: list[Change] = [{"controller.tolerance": share * allowed} for share in (0.9, 0.5, 0.2)]
+        yield case.cause(text, (*stricter, *stiffened(scenario, 2.0, 4.0)))
+    gains = _gains_of_another_device(case)
+    of_loop = (_static_friction(case), _shut_valve(case), _oscillation(case), _small_valve(case))
+    yield from filter(None, (*of_loop, beyond, gains, _lag(case)))
+    # A loop that neither swings nor rests needs longer than its reference rests, or larger gains.
+    if case.failure == "does not follow" and case.is_approaching:
+        limit = float(settings.get("error_limit", 0.0))
+        further: list[Change] = [{"controller.error_limit": by * limit} for by in (2.0, 4.0) if limit > 0.0]
+        further += [{"run.duration": by * scenario.run.duration} for by in (2.0, 4.0)]
+        text = f"it is still on its way at the end, {settled.duration:.3g} s later"
+        advice = "let the reference rest longer, or use larger gains"
+        yield case.cause(text, further + rescaled_gains(scenario, 2.0, 4.0), advice)
+    # The gas spring swings the joint of an angle controller without inner torque loop.
+    is_stiff = scenario.controlled != ANGLE or torque_asked(scenario, 0.0) is not None
+    if law is not None and not (is_stiff or law.only_switches):
+        text = f"`{law.name}` controls the angle without an inner torque loop and is slow against load and friction"
+        yield TrackingCause(text, (CASCADE,))
+    yield from filter(None, (_late_device(case),))
+    # Of a loop that does not oscillate, the flaws of a regulator are less certain than any other cause.
+    if case.oscillates:
+        yield from _of_regulator(case)
+    yield from _of_sensors(case)
+    yield _not_settled(case)
+    if not case.oscillates:
+        yield from _of_regulator(case)
 
 
 def _request_beyond_reach(case: Case) -> TrackingCause | None:
     """Cause: the controller of a walk often requests more torque than the actuator gives at the current angle."""
-    scenario, samples = case.scenario, case.samples
-    if case.failure == "overshoots" or controlled_in(case.recording) is None:
+    if case.overshoots or controlled_in(case.recording) is None:
         return None
-    reference, angle = followed(case.recording)[0][samples], case.recording["angle"][samples]
+    settings, settled = case.scenario.controller.settings, case.settled
     places, reaches = reach_at_samples(case)
-    above, below = reference[places] - reaches[:, 1], reaches[:, 0] - reference[places]
+    reference, angle = case.reference[places], case.channel("angle")[places]
+    above, below = reference - reaches[:, 1], reaches[:, 0] - reference
     share = float(np.mean((above > 0.0) | (below > 0.0)))
-    lacks_peak = case.settled.given_peak < LEAST_PEAK_WALK * case.settled.requested_peak
-    if share <= (0.0 if lacks_peak else _OFTEN):
+    if share <= (0.0 if settled.given_peak < LEAST_PEAK_WALK * settled.requested_peak else _OFTEN):
         return None
     if np.mean(below > 0.0) > _OFTEN and -reaches[:, 0].min() <= ONE_WAY * reaches[:, 1].max():
         # Dorsiflexion torque requested from an actuator that pushes in plantarflexion only.
-        asked, lowest = float(reference[places].min()), float(reaches[:, 0].min())
-        text = (
-            f"the controller requests {level_text('N m', asked)}, but the actuator gives {reach_text(lowest, False)}: "
-            "it acts in one direction only"
-        )
-        settings = scenario.controller.settings
+        asked, given_text = float(reference.min()), reach_text(float(reaches[:, 0].min()), False)
+        text = f"the controller requests {level_text('N m', asked)}, but the actuator gives {given_text}{ACTS_ONE_WAY}"
         unasked = {f"controller.{name}": 0.0 for name in _DORSIFLEXION if settings.get(name, 0.0) > 0.0}
-        omission = (remedy(scenario, unasked),) if unasked else ()
         advice = "request no dorsiflexion torque, or add a spring that lifts the foot"
-        return TrackingCause(text, omission, advice)
+        return case.cause(text, [unasked] if unasked else [], advice)
     at = int(np.argmax(np.maximum(above, below)))
-    asked, given = float(reference[places][at]), float(reaches[at, 1 if above[at] > 0.0 else 0])
+    asked, given = float(reference[at]), float(reaches[at, 1 if above[at] > 0.0 else 0])
     text = (
         f"for {100.0 * share:.0f} % of the time the controller requests more torque than the actuator gives, such as "
         f"{level_text('N m', asked)} where the actuator gives {level_text('N m', given)}"
     )
-    numbers: dict[str, float] = {}
+    supplies: dict[str, float] = {}
     for path, lacking in (("supply.pressure", above), ("supply.dorsiflexion_pressure", below)):
-        place = places[int(np.argmax(lacking))]
-        needed = supply_for(scenario.device, float(angle[place]), 1.05 * float(reference[place]))
+        place = int(np.argmax(lacking))
+        needed = supply_for(case.device, float(angle[place]), 1.05 * float(reference[place]))
         if needed is not None and lacking.max() > 0.0:
-            numbers[path] = needed
-    remedies = [remedy(scenario, numbers)] if numbers else []
-    least = float(np.quantile(np.where(reference[places] > 0.0, reaches[:, 1], -reaches[:, 0]), _OFTEN))
-    if min(least, scenario.controller.settings.get("largest_torque", 0.0)) > 0.0:
-        remedies.append(remedy(scenario, {"controller.largest_torque": least}))
-    advice = "increase `supply.pressure` or request less torque"
-    return TrackingCause(text, tuple(remedies), advice)
+            supplies[path] = needed
+    changes = [supplies] if supplies else []
+    least = float(np.quantile(np.where(reference > 0.0, reaches[:, 1], -reaches[:, 0]), _OFTEN))
+    if min(least, settings.get("largest_torque", 0.0)) > 0.0:
+        changes.append({"controller.largest_torque": least})
+    return case.cause(text, changes, "increase `supply.pressure` or request less torque")
 
 
-def _speed_of_gait(case: Case) -> TrackingCause:
-    """Cause: the gait moves the joint faster than the torque loop follows."""
-    scenario = case.scenario
-    volumes = {path: number_at(scenario, path) for path in ("actuator.dead_volume_1", "actuator.dead_volume_2")}
-    remedies = [] if case.law is None else [*sized_valves(scenario, (0.5, 2.0))]
-    if min(volumes.values()) > 0.0:
-        larger = [{path: factor * number for path, number in volumes.items()} for factor in (2.0, 4.0)]
-        remedies += [remedy(scenario, numbers) for numbers in larger]
-    text = "the gait moves the joint faster than the torque loop can follow"
-    return TrackingCause(text, tuple(remedies), "use larger dead volumes or a faster valve")
-
-
-def _dead_band_of_walk(case: Case) -> TrackingCause | None:
-    """Cause: the command of a walk often stays within the valve's dead band, without compensation by its controller."""
-    scenario = case.scenario
+def causes_of_walk(case: Case) -> Iterator[TrackingCause]:
+    """Yield the causes of a walk that does not give the requested torque, most certain first, and at least one."""
+    scenario, settled, overshoots = case.scenario, case.settled, case.overshoots
+    # Gains that make a walk oscillate, or a pair of valves whose step exceeds the torque limit.
+    may_swing = case.oscillates or (overshoots and case.only_switches)
+    yield from filter(None, (_request_beyond_reach(case), _oscillation(case) if may_swing else None))
+    # The controller does not compensate the dead band.
     band = dead_band(scenario) - float(scenario.controller.settings.get("dead_band", 0.0))
-    command = np.abs(case.recording["command"][case.samples])
+    command = np.abs(case.channel("command"))
     share = float(np.mean((command > SHUT) & (command <= band)))
-    if share <= _OFTEN or case.failure == "overshoots":
-        return None
-    text = f"the command stays within `valve.dead_band = {band:.2g}` for {100.0 * share:.0f} % of the time"
-    advice = "use a valve without dead band, or a controller that compensates the dead band"
-    return TrackingCause(text, rescaled_gains(scenario, case.law, (2.0, 4.0, 8.0)), advice)
-
-
-def _small_valve_of_walk(case: Case) -> TrackingCause | None:
-    """Cause: the valve of a walk is often fully open, and too small for the speed of the joint."""
-    share, settled = _open_share(case), case.settled
+    if share > _OFTEN and not overshoots:
+        text = f"the command stays within `valve.dead_band = {band:.2g}` for {100.0 * share:.0f} % of the time"
+        advice = "use a valve without dead band, or a controller that compensates the dead band"
+        yield case.cause(text, rescaled_gains(scenario, 2.0, 4.0, 8.0), advice)
     # An oscillating loop, and on/off valves, are fully open for other reasons, unless they give too little.
     lacks = settled.given_peak < LEAST_PEAK_WALK * settled.requested_peak
-    if share <= _OFTEN or ((case.oscillates or case.only_switches) and not lacks):
-        return None
-    text = f"the valve is fully open for {100.0 * share:.0f} % of the time: it is too small for the speed of this gait"
-    return TrackingCause(text, sized_valves(case.scenario, _VALVES_OF_WALK), "use a larger valve")
-
-
-CAUSES_OF_WALK: tuple[Callable[[Case], TrackingCause | None], ...] = (
-    _request_beyond_reach,
-    # Gains that make a walk oscillate, or a pair of valves whose step exceeds the torque limit.
-    lambda case: (
-        _oscillation(case) if case.oscillates or (case.failure == "overshoots" and case.only_switches) else None
-    ),
-    _dead_band_of_walk,
-    _small_valve_of_walk,
-    _gains_of_another_device,
-    _speed_of_gait,
-)
-"""Causes of a walk, most certain first; the last one always applies."""
+    if case.open_share > _OFTEN and (lacks or not (case.oscillates or case.only_switches)):
+        text = f"{_fully_open(case)} the speed of this gait"
+        yield case.cause(text, sized_valves(scenario, *_VALVES_OF_WALK), "use a larger valve")
+    yield from filter(None, (_gains_of_another_device(case),))
+    volumes = {path: number_at(scenario, path) for path in ("actuator.dead_volume_1", "actuator.dead_volume_2")}
+    changes = [] if case.law is None else sized_valves(scenario, 0.5, 2.0)
+    if min(volumes.values()) > 0.0:
+        changes += [{path: factor * number for path, number in volumes.items()} for factor in (2.0, 4.0)]
+    text = "the gait moves the joint faster than the torque loop can follow"
+    yield case.cause(text, changes, "use larger dead volumes or a faster valve")

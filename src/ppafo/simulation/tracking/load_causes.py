@@ -20,10 +20,10 @@ from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.remedies import (
+    Change,
     Remedy,
     change_text,
     level_text,
-    remedy,
     stated_number,
     stiffened,
     stiffer_laws,
@@ -38,6 +38,8 @@ _MORE_TORQUE = (1.1, 1.3, 1.6, 2.5)
 """Torques of trials, divided by the largest present torque [-]."""
 _NEGATIVE = " in the negative direction"
 """Direction of a torque whose sign a text omits."""
+ACTS_ONE_WAY = ": it acts in one direction only"
+"""Reason for a torque that an actuator does not give."""
 _SAMPLES = 400
 """Largest number of samples at which the reach is compared with the torque."""
 _WITHIN = 0.95
@@ -87,9 +89,9 @@ def reach_at_samples(case: Case) -> tuple[NDArray[np.intp], Floats]:
 
     Returns the indices, counted from the first settled sample, and torques of shape (samples, 2).
     """
-    device, angle = case.scenario.device, case.recording["angle"][case.samples]
-    chosen, torque = np.unique(np.linspace(0, angle.size - 1, _SAMPLES).astype(np.intp)), static_torque(device)
-    return chosen, np.array([torque_reach(device, float(angle[index]), torque) for index in chosen])
+    angle, torque = case.channel("angle"), static_torque(case.device)
+    chosen = np.unique(np.linspace(0, angle.size - 1, _SAMPLES).astype(np.intp))
+    return chosen, np.array([torque_reach(case.device, float(angle[index]), torque) for index in chosen])
 
 
 def _supplies_for(
@@ -106,14 +108,13 @@ def _supplies_for(
 
 def torque_peaks(case: Case) -> tuple[TorqueReach, TorqueReach]:
     """Highest and lowest wanted torque with the reach there; a reference with a period counts with its own peaks."""
-    scenario, samples = case.scenario, case.samples
-    reference, angle = followed(case.recording)[0][samples], case.recording["angle"][samples]
+    reference, angle, device = case.reference, case.channel("angle"), case.device
     has_period = math.isfinite(case.settled.reference_periods)
-    lowest, highest = profile_bounds(scenario.reference) if has_period else (reference.min(), reference.max())
+    lowest, highest = profile_bounds(case.scenario.reference) if has_period else (reference.min(), reference.max())
     top, bottom = float(angle[int(np.argmax(reference))]), float(angle[int(np.argmin(reference))])
     return (
-        TorqueReach(float(highest), torque_reach(scenario.device, top)[1], top, upwards=True),
-        TorqueReach(float(lowest), torque_reach(scenario.device, bottom)[0], bottom, upwards=False),
+        TorqueReach(float(highest), torque_reach(device, top)[1], top, upwards=True),
+        TorqueReach(float(lowest), torque_reach(device, bottom)[0], bottom, upwards=False),
     )
 
 
@@ -127,26 +128,23 @@ def cuts_wave(case: Case) -> bool:
 
 def torque_beyond_reach(case: Case) -> TrackingCause | None:
     """Cause: the wanted torque exceeds the actuator's torque from its supplies at that angle."""
-    scenario, device, settled = case.scenario, case.scenario.device, case.settled
-    if scenario.controlled != TORQUE or case.oscillates:
+    scenario, device, settled = case.scenario, case.device, case.settled
+    peaks = torque_peaks(case) if scenario.controlled == TORQUE and not case.oscillates else ()
+    lacking = [peak for peak in peaks if peak.lacking > 0.0]
+    if not lacking:
         return None
-    peaks = torque_peaks(case)
-    worst = max(peaks, key=lambda peak: peak.lacking)
-    if worst.lacking <= 0.0:
-        return None
-    supply = supply_that_moves(device, worst.upwards)
-    stop = stop_of(scenario, case.recording["angle"][case.samples]) if isinstance(scenario.motion, FreeMotion) else ""
-    lies = f"only the {stop} stop, on which the joint lies, resists the torque: " if stop else ""
+    worst = max(lacking, key=lambda peak: peak.lacking)
     # An actuator that only pushes gives least where its chamber is vented.
     pushes = worst.reach > 0.0 and not worst.upwards
-    filled = float(device.lowest_pressure if pushes else device.highest_pressures[supply != PRESSURE_PATH])
+    of_second = supply_that_moves(device, worst.upwards) != PRESSURE_PATH
+    filled = float(device.lowest_pressure if pushes else device.highest_pressures[of_second])
     text = (
-        f"{lies}at {level_text('rad', worst.angle)} and {level_text('Pa', filled)} the "
+        f"at {level_text('rad', worst.angle)} and {level_text('Pa', filled)} the "
         f"actuator gives {reach_text(worst.reach, worst.upwards)}"
     )
-    if lies:
-        return TrackingCause(text, (), f"lock the joint ({LOCKED.text}) or add a load")
-    lacking = [peak for peak in peaks if peak.lacking > 0.0]
+    if isinstance(scenario.motion, FreeMotion) and (stop := stop_of(scenario, case.channel("angle"))):
+        text = f"only the {stop} stop, on which the joint lies, resists the torque: {text}"
+        return case.cause(text, (), f"lock the joint ({LOCKED.text}) or add a load")
     torques = [(supply_that_moves(device, peak.upwards), peak.angle, peak.wanted) for peak in lacking]
     changes = _supplies_for(device, torques, _MARGINS)
     if pushes and "lowest_pressure" in device.valve.settings:
@@ -159,74 +157,76 @@ def torque_beyond_reach(case: Case) -> TrackingCause | None:
     # The judged half of a trial shows a period of the reference.
     is_long = settled.rests or settled.reference_periods >= FEWEST_PERIODS
     longer = {} if is_long else {"run.duration": scenario.run.duration / settled.reference_periods}
-    return TrackingCause(text, tuple(remedy(scenario, {**each, **longer}) for each in changes))
+    return case.cause(text, ({**each, **longer} for each in changes))
 
 
 def below_lowest_set_pressure(case: Case) -> TrackingCause | None:
     """Cause: the reference of a chamber's pressure is below the lowest pressure that its regulator can be set to."""
-    scenario, path = case.scenario, "valve.lowest_pressure"
-    lowest, asked = scenario.device.lowest_pressure, float(np.min(followed(case.recording)[0][case.samples]))
+    scenario, path, lowest = case.scenario, "valve.lowest_pressure", case.device.lowest_pressure
     # A difference, a torque and an angle have their reach from both chambers.
     is_level = scenario.controlled in ("pressure_1", "pressure_2") and path in declared_numbers(scenario)
+    asked = float(np.min(case.reference))
     if not is_level or asked >= lowest or case.settled.mean_error <= 0.0:
         return None
-    changes = [{path: asked}]
-    if PROFILES[scenario.reference.kind].is_monotone:
-        changes.append({"reference.level": float(lowest)})
-    text = (
-        f"the regulator sets no less than {stated_number(scenario, path)}, and {level_text('Pa', asked)} is asked for"
-    )
-    return TrackingCause(text, tuple(remedy(scenario, each) for each in changes))
+    is_monotone = PROFILES[scenario.reference.kind].is_monotone
+    changes = [{path: asked}, *([{"reference.level": float(lowest)}] if is_monotone else [])]
+    stated, asked_text = stated_number(scenario, path), level_text("Pa", asked)
+    return case.cause(f"the regulator sets no less than {stated}, and {asked_text} is asked for", changes)
+
+
+def _load_at(case: Case, angle: float) -> float | None:
+    """Torque of load and weight at a controlled angle [rad] of a free joint; None for other joints, and for legs."""
+    motion = case.scenario.motion
+    if case.scenario.controlled != ANGLE or not isinstance(motion, FreeMotion) or motion.leg is not None:
+        return None
+    return float(motion.outside_torque) + float(gravity_torque(angle, case.device.foot_plate.gravity_torque))
 
 
 def load_beyond_reach(case: Case) -> TrackingCause | None:
     """Cause: the load on a free joint exceeds the actuator's torque at the wanted angle."""
-    scenario, motion, device = case.scenario, case.scenario.motion, case.scenario.device
-    if scenario.controlled != ANGLE or not isinstance(motion, FreeMotion) or motion.leg is not None:
+    scenario, device, wanted = case.scenario, case.device, float(np.mean(case.reference))
+    if (load := _load_at(case, wanted)) is None:
         return None
-    reference, angle = (series[case.samples] for series in followed(case.recording))
-    wanted, outside = float(np.mean(reference)), float(motion.outside_torque)
     lowest, highest = torque_reach(device, wanted)
-    load = outside + float(gravity_torque(wanted, device.foot_plate.gravity_torque))
+    outside = float(number_at(scenario, "motion.external_torque"))
     # A joint that rests beside its reference needs what breaks its static friction, too.
-    holding = float(device.friction.static_torque) if case.settled.rests else 0.0
+    friction = float(device.friction.static_torque)
+    holding = friction if case.settled.rests else 0.0
     is_within = lowest <= load <= highest
     is_high = load > highest if not is_within else case.settled.mean_error < 0.0
     needed_torque = load if not is_within else load + holding if is_high else load - holding
     if lowest <= needed_torque <= highest:
         return None
     reach, supply = highest if is_high else lowest, supply_that_moves(device, is_high)
-    rests = f"the joint lies on its {stop} stop: " if (stop := stop_of(scenario, angle)) else ""
+    rests = f"the joint lies on its {stop} stop: " if (stop := stop_of(scenario, case.channel("angle"))) else ""
     works, gives = level_text("N m", needed_torque), reach_text(reach, is_high)
     against = "" if not is_within else f" to break its static friction of {level_text('N m', holding)}"
     text = f"{rests}the load needs {works} at {level_text('rad', wanted)}{against}, the actuator gives {gives}"
-    needed = supply_for(device, wanted, 1.3 * needed_torque)
+    needed, advice = supply_for(device, wanted, 1.3 * needed_torque), ""
     changes: list[dict[str, float]] = [] if needed is None else [{supply: needed}]
-    advice = ""
     is_one_way = abs(reach) <= ONE_WAY * max(abs(lowest), abs(highest))
     if is_one_way or (needed is None and not outside):
         # The pull of its material is too little, and no pressure gives more.
-        text = f"{text}: it acts in one direction only" if is_one_way else text
+        text += ACTS_ONE_WAY * is_one_way
         advice = "add a spring or a weight that pulls the joint back"
         back = reach + (1.5 if not is_high else -1.5) * holding + _PULLED_BACK * (highest + lowest)
         changes.append({"motion.external_torque": back - (load - outside)})
     elif outside:
         changes.append({"motion.external_torque": 0.7 * reach - (load - outside)})
-    remedies = [remedy(scenario, numbers) for numbers in changes]
+    further: list[Change] = []
     # A law without an integral requests no torque where there is no error, and knows nothing of the load.
-    if torque_asked(scenario, case.law, case.settled.rms_error) is not None:
-        for numbers in changes:
-            held = abs(numbers.get("motion.external_torque", outside)) + float(device.friction.static_torque)
-            remedies += stiffer_laws(scenario, held, case.settled, numbers)
-    return TrackingCause(text, tuple(remedies), advice)
+    for numbers in changes if torque_asked(scenario, case.settled.rms_error) is not None else ():
+        held = abs(numbers.get("motion.external_torque", outside)) + friction
+        further += stiffer_laws(scenario, held, case.settled, numbers)
+    return case.cause(text, (*changes, *further), advice)
 
 
 def torque_at_its_limit(case: Case) -> TrackingCause | None:
     """Cause: the actuator of a joint whose angle is controlled often gives all the torque that its supplies allow."""
-    scenario, device, samples = case.scenario, case.scenario.device, case.samples
+    scenario, device = case.scenario, case.device
     if scenario.controlled != ANGLE or case.oscillates or case.only_switches:
         return None
-    angle, torque = case.recording["angle"][samples], case.recording["torque"][samples]
+    angle, torque = case.channel("angle"), case.channel("torque")
     places, reaches = reach_at_samples(case)
     # An actuator that pushes one way only has a reach in one direction only: below 0 downwards, above 0 upwards.
     acts = reaches * np.array([-1.0, 1.0]) > 0.0
@@ -234,10 +234,9 @@ def torque_at_its_limit(case: Case) -> TrackingCause | None:
     share = float(np.mean(shares.max(axis=1) > _NEARLY_ALL))
     if share <= _OFTEN:
         return None
-    found = [(upwards, int(np.argmax(shares[:, int(upwards)]))) for upwards in (False, True)]
-    limited = [(upwards, place) for upwards, place in found if shares[place, int(upwards)] > _NEARLY_ALL]
+    limited = [(up, at) for up, at in enumerate(shares.argmax(axis=0).tolist()) if shares[at, up] > _NEARLY_ALL]
     ends = [
-        (supply_that_moves(device, up), float(angle[places[at]]), float(reaches[at, int(up)])) for up, at in limited
+        (supply_that_moves(device, bool(up)), float(angle[places[at]]), float(reaches[at, up])) for up, at in limited
     ]
     (supply, where, given), *_ = ends
     text = (
@@ -247,10 +246,8 @@ def torque_at_its_limit(case: Case) -> TrackingCause | None:
     )
     pressures = _supplies_for(device, ends, _MORE_TORQUE)
     # A load that is near the limit of the actuator often is too much for the stiffness of the law, too.
-    stiffer = [dict(each.numbers) for each in stiffened(scenario, (2.0, 4.0))]
-    both = [{**pressure, **numbers} for pressure in pressures[-2:] for numbers in stiffer]
-    remedies = [remedy(scenario, numbers) for numbers in (*pressures, *both)]
-    return TrackingCause(text, tuple(remedies), f"increase `{supply}`")
+    both = [{**pressure, **stiffer} for pressure in pressures[-2:] for stiffer in stiffened(scenario, 2.0, 4.0)]
+    return case.cause(text, (*pressures, *both), f"increase `{supply}`")
 
 
 def stop_of(scenario: Scenario, angle: Floats) -> str:
@@ -261,27 +258,24 @@ def stop_of(scenario: Scenario, angle: Floats) -> str:
 
 def flung_at_start(case: Case) -> TrackingCause | None:
     """Cause: the initial pressures do not carry the load, which throws the joint off before the loop catches it."""
-    scenario, motion, device, initial = case.scenario, case.scenario.motion, case.scenario.device, case.scenario.initial
-    if case.oscillates or scenario.controlled != ANGLE or not isinstance(motion, FreeMotion) or motion.leg is not None:
-        return None
-    reference, angle = followed(case.recording)
+    device, initial, (reference, angle) = case.device, case.scenario.initial, followed(case.recording)
     start = float(angle[0])
-    load = float(motion.outside_torque) + float(gravity_torque(start, device.foot_plate.gravity_torque))
+    if case.oscillates or (load := _load_at(case, start)) is None:
+        return None
     torque_at = static_torque(device)
     lacking = load - torque_at(start, float(initial.pressure_1), float(initial.pressure_2))
     # A lack of torque turns the joint to smaller angles.
     deviation = float(np.max((reference - angle) * np.sign(lacking)))
     if abs(lacking) <= float(device.friction.static_torque) or deviation <= _FLUNG * case.settled.wanted_change:
         return None
-    atmosphere, needed = float(device.supply.atmospheric_pressure), supply_for(device, start, load)
     text = (
         f"at the start the chambers give {level_text('N m', load - lacking)} for a load of "
         f"{level_text('N m', load)}: the joint moves away by {change_text(ANGLE, deviation)} "
         "before the chambers are filled"
     )
-    pressures = {"initial.pressure_1": atmosphere, "initial.pressure_2": atmosphere}
-    if needed is not None:
+    changes, atmosphere = list[Change](), float(device.supply.atmospheric_pressure)
+    if (needed := supply_for(device, start, load)) is not None:
         is_first = supply_that_moves(device, load > torque_at(start, atmosphere, atmosphere)) == PRESSURE_PATH
-        pressures["initial.pressure_1" if is_first else "initial.pressure_2"] = needed
-    remedies = [] if needed is None else [remedy(scenario, pressures)]
-    return TrackingCause(text, tuple(remedies), "give pressures in [initial] that carry the load")
+        pressures = (needed, atmosphere) if is_first else (atmosphere, needed)
+        changes.append({"initial.pressure_1": pressures[0], "initial.pressure_2": pressures[1]})
+    return case.cause(text, changes, "give pressures in [initial] that carry the load")

@@ -1,12 +1,12 @@
 """Remedies for a loop that does not follow its reference: changed numbers of the scenario, most promising first."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 from ppafo.control import angle_loop, torque_loop
-from ppafo.control.kind import ControllerKind
 from ppafo.metrics.settled import LARGEST_SHARE, SettledPart
 from ppafo.model.controlled import ANGLE, CONTROLLED
 from ppafo.model.declaration import Quantity
@@ -19,6 +19,8 @@ from ppafo.simulation.numbers import declared_numbers, number_at, of_its_chamber
 from ppafo.simulation.scenario import Scenario
 from ppafo.wording import override_text, without_exponent
 
+Change = Mapping[str, float]
+"""Numbers of a scenario [SI] by path."""
 FASTEST_FIRST = (
     torque_loop.proportional_gain,
     torque_loop.boundary_layer,
@@ -31,8 +33,6 @@ SLOWER_ABOVE = frozenset((torque_loop.boundary_layer,))
 """Settings whose increase makes the loop slower."""
 _SAME_GAIN = 0.02
 """Relative difference up to which two gains count as the same [-]."""
-_STEPS_OF_PAIR = (0.2, 0.3, 0.4, 0.5, 0.6, 0.1)
-"""Steps of a pair during its dead time divided by the wanted change, aimed at with smaller orifices [-]."""
 _TORQUE_OVER_FRICTION = 1.5
 """Torque that a controller should be able to request, divided by the static friction of the joint [-]."""
 _SHORT = 0.1
@@ -45,7 +45,7 @@ _KEPT_OF_ORIFICE = (".critical_ratio", ".discharge_coefficient")
 class Remedy:
     """Remedy: numbers of a scenario [SI] by path that might make it follow, and the same numbers as overrides."""
 
-    numbers: Mapping[str, float]
+    numbers: Change
     overrides: tuple[str, ...]
 
     @property
@@ -67,7 +67,7 @@ CASCADE = Remedy({}, ("controller.kind=cascade",))
 """Remedy for a law that opens the valve by an angle alone: a torque loop inside."""
 
 
-def remedy(scenario: Scenario, numbers: Mapping[str, float]) -> Remedy:
+def remedy(scenario: Scenario, numbers: Change) -> Remedy:
     """Remedy with its overrides in the units of the device."""
     declared, numbers = declared_numbers(scenario), of_its_chambers(numbers, scenario.device)
     overrides = (
@@ -98,86 +98,75 @@ def change_text(controlled: str, number: float, digits: int = 3) -> str:
     return f"{without_exponent(value, f'.{digits}g')} {unit}"
 
 
-def speed_settings(scenario: Scenario, law: ControllerKind | None) -> dict[Any, Quantity]:
+def own_settings(scenario: Scenario) -> tuple[Quantity, ...]:
+    """Return the declared settings of the controller; none of a Python object."""
+    law = scenario.law
+    return () if law is None else law_settings(law, scenario.controlled)
+
+
+def speed_settings(scenario: Scenario) -> dict[Any, Quantity]:
     """Settings that determine the speed of a controller's loops, by the rule that they follow, innermost loop first."""
-    if law is None:
-        return {}
-    items = {
-        term: quantity
-        for quantity in law_settings(law, scenario.controlled)
-        for term in FASTEST_FIRST
-        if term == quantity.follows and f"controller.{quantity.name}" in declared_numbers(scenario)
-    }
+    declared = declared_numbers(scenario)
+    items = {item.follows: item for item in own_settings(scenario) if f"controller.{item.name}" in declared}
     return {term: items[term] for term in FASTEST_FIRST if term in items}
 
 
-def default_gain_remedies(scenario: Scenario, law: ControllerKind | None) -> list[Remedy]:
-    """Remedies with the device's default of the first gain that differs from it, then of all overridden gains."""
-    if law is None:
-        return []
+def default_gains(scenario: Scenario) -> list[Change]:
+    """Changes to the device's default of the first gain that differs from it, then of all overridden gains."""
     settings, defaults = scenario.controller.settings, dict[str, float]()
-    gains = (item for item in law_settings(law, scenario.controlled) if is_gain(item))
-    for path, (link,) in default_links(scenario, gains).items():
+    for path, (link,) in default_links(scenario, filter(is_gain, own_settings(scenario))).items():
         if path not in scenario.links:
             # A default may follow one of this list before it.
             defaults[path] = float(link.number(lambda at: defaults[at] if at in defaults else number_at(scenario, at)))
-    for quantity in speed_settings(scenario, law).values():
+    for quantity in speed_settings(scenario).values():
         path, present = f"controller.{quantity.name}", float(settings[quantity.name])
         if abs(present - defaults.get(path, present)) > _SAME_GAIN * defaults.get(path, present):
             slopes = {f"controller.{name}": 0.0 for name in SLOPE_GAINS if settings.get(name, 0.0) > 0.0}
             typed = {override.typed for override in read_overrides(scenario.origin.overrides)}
             given = {each: defaults[each] for each in defaults if each in typed}
-            changes = ({path: defaults[path], **slopes}, {**slopes, **given})
-            return [remedy(scenario, numbers) for numbers in changes[: max(1, len(given))]]
+            changes: list[Change] = [{path: defaults[path], **slopes}, {**slopes, **given}]
+            return changes[: max(1, len(given))]
     return []
 
 
-def default_integral_remedy(scenario: Scenario, law: ControllerKind | None) -> list[Remedy]:
-    """Remedy that sets an integral gain of 0 to the device's default; empty without such a gain."""
-    if law is None:
-        return []
+def default_integral(scenario: Scenario) -> list[Change]:
+    """Changes of an integral gain of 0 to the device's default; none without such a gain."""
     settings = scenario.controller.settings
-    integrals = [item for item in law_settings(law, scenario.controlled) if item.follows == torque_loop.integral_gain]
+    integrals = (item for item in own_settings(scenario) if item.follows == torque_loop.integral_gain)
     links = default_links(scenario, (item for item in integrals if settings.get(item.name) == 0.0))
     defaults = {path: link.number(lambda at: number_at(scenario, at)) for path, (link,) in links.items()}
-    return [remedy(scenario, {path: default}) for path, default in defaults.items() if default > 0.0]
+    return [{path: default} for path, default in defaults.items() if default > 0.0]
 
 
-def rescaled_gains(scenario: Scenario, law: ControllerKind | None, factors: Iterable[float]) -> tuple[Remedy, ...]:
-    """Remedies that change the speed of the innermost loop by each of some factors; empty if it cannot be set."""
-    innermost, settings = list(speed_settings(scenario, law).items())[:1], scenario.controller.settings
+def rescaled_gains(scenario: Scenario, *factors: float) -> list[Change]:
+    """Changes of the speed of the innermost loop by each of some factors; none if it cannot be set."""
+    innermost, settings = list(speed_settings(scenario).items())[:1], scenario.controller.settings
     powers = [(f"controller.{item.name}", item.name, -1.0 if term in SLOWER_ABOVE else 1.0) for term, item in innermost]
-    changes = [{path: settings[name] * factor**power} for path, name, power in powers for factor in factors]
-    return tuple(remedy(scenario, numbers) for numbers in changes)
+    return [{path: settings[name] * factor**power} for path, name, power in powers for factor in factors]
 
 
-def sized_valves(scenario: Scenario, factors: Iterable[float]) -> tuple[Remedy, ...]:
-    """Remedies that multiply the valve's orifice by each of some factors, in the form in which it is given."""
+def sized_valves(scenario: Scenario, *factors: float) -> list[Change]:
+    """Changes of the valve's orifice by each of some factors, in the form in which it is given."""
     orifice = scenario.device.valve.orifice
     is_sonic = isinstance(orifice, SonicOrifice)
     size, other = ("sonic_conductance", "critical_ratio") if is_sonic else ("area", "discharge_coefficient")
     kept, number = {f"valve.{other}": float(getattr(orifice, other))}, float(getattr(orifice, size))
-    return tuple(remedy(scenario, {f"valve.{size}": number * factor, **kept}) for factor in factors)
+    return [{f"valve.{size}": number * factor, **kept} for factor in factors]
 
 
-def smaller_pair(scenario: Scenario, step: float) -> tuple[Remedy, ...]:
-    """Remedies with smaller orifices, for a pair whose step is ``step`` times the wanted change."""
-    return sized_valves(scenario, (share / step for share in _STEPS_OF_PAIR if share < step))
-
-
-def torque_asked(scenario: Scenario, law: ControllerKind | None, error: float) -> float | None:
+def torque_asked(scenario: Scenario, error: float) -> float | None:
     """Torque [N m] requested at an angle error [rad] by a controller with a stiffness; None for another controller."""
-    items = () if law is None else law_settings(law, scenario.controlled)
-    if scenario.controlled != ANGLE or not any(item.follows == angle_loop.angle_stiffness for item in items):
+    is_stiff = any(item.follows == angle_loop.angle_stiffness for item in own_settings(scenario))
+    if scenario.controlled != ANGLE or not is_stiff:
         return None
     settings = scenario.controller.settings
     return float(settings["angle_stiffness"]) * min(float(settings["error_limit"]), error)
 
 
 def stiffer_laws(
-    scenario: Scenario, holding: float, settled: SettledPart, others: Mapping[str, float] | None = None
-) -> list[Remedy]:
-    """Remedies with larger angle stiffness against a load ``holding`` [N m], without and with adapted damping.
+    scenario: Scenario, holding: float, settled: SettledPart, others: Change = MappingProxyType({})
+) -> list[Change]:
+    """Changes to a larger angle stiffness against a load ``holding`` [N m], without and with adapted damping.
 
     ``others`` are numbers that change as well. For a valve with a dead band, the two stiffest remedies are also tried
     with a torque gain that opens the valve beyond the band.
@@ -187,25 +176,26 @@ def stiffer_laws(
     damping, band = float(settings.get("angle_damping", 0.0)), dead_band(scenario)
     allowed = LARGEST_SHARE * settled.wanted_change
     sufficient = (_TORQUE_OVER_FRICTION * holding / limit, 3.0 * holding / limit, holding / (0.8 * allowed))
-    changes: list[dict[str, float]] = []
+    changes: list[Change] = []
     for stiffness in sorted(value for value in sufficient if value > present > 0.0):
-        stiffer = {**(others or {}), "controller.angle_stiffness": stiffness}
+        stiffer = {**others, "controller.angle_stiffness": stiffness}
         changes += [stiffer, {**stiffer, "controller.angle_damping": damping * math.sqrt(stiffness / present)}]
     gain = float(settings.get("torque_gain", 0.0))
-    if band > 0.0 and gain > 0.0:
-        for numbers in changes[-2:]:
-            needed = band / max(numbers["controller.angle_stiffness"] * allowed, 1.0e-9)
-            larger = (times * needed for times in (1.0, 2.0) if times * needed > gain)
-            changes += [{**numbers, "controller.torque_gain": number} for number in larger]
-    return [remedy(scenario, numbers) for numbers in changes]
+    for numbers in changes[-2:] if band > 0.0 and gain > 0.0 else ():
+        needed = band / max(numbers["controller.angle_stiffness"] * allowed, 1.0e-9)
+        larger = (times * needed for times in (1.0, 2.0) if times * needed > gain)
+        changes += [{**numbers, "controller.torque_gain": number} for number in larger]
+    return changes
 
 
-def stiffened(scenario: Scenario, factors: Iterable[float]) -> list[Remedy]:
-    """Remedies with the angle stiffness times each of some factors, and matching damping; none without stiffness."""
+def stiffened(scenario: Scenario, *factors: float) -> list[Change]:
+    """Changes of the angle stiffness by each of some factors, and matching damping; none without stiffness."""
     settings, powers = scenario.controller.settings, {"angle_stiffness": 1.0, "angle_damping": 0.5}
     known = {name: power for name, power in powers.items() if name in settings}
-    changes = [{f"controller.{name}": settings[name] * factor ** known[name] for name in known} for factor in factors]
-    return [remedy(scenario, numbers) for numbers in changes if numbers]
+    return [
+        {f"controller.{name}": settings[name] * factor**power for name, power in known.items()}
+        for factor in (factors if known else ())
+    ]
 
 
 def dead_band(scenario: Scenario) -> float:

@@ -1,19 +1,26 @@
 """Verdict on a run: whether it follows its reference, the cause of a failure, and remedies that were tried."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from ppafo.metrics.metric import controlled_in, extent
-from ppafo.metrics.settled import IN_PUSH_OFF, LARGEST_EXCUSED, LARGEST_SHARE, LARGEST_SHARE_OF_WAVE, MOST_REVERSALS
+from ppafo.metrics.settled import (
+    IN_PUSH_OFF,
+    LARGEST_EXCUSED,
+    LARGEST_SHARE,
+    LARGEST_SHARE_OF_WAVE,
+    MOST_REVERSALS,
+    SettledPart,
+)
 from ppafo.model.controlled import CONTROLLED
 from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.case import Case, TrackingCause
-from ppafo.simulation.tracking.causes import CAUSES_OF_TASK, CAUSES_OF_WALK
+from ppafo.simulation.tracking.causes import causes_of_task, causes_of_walk
 from ppafo.simulation.tracking.load_causes import cuts_wave, torque_beyond_reach
 from ppafo.simulation.tracking.remedies import Remedy, change_text, rank
 from ppafo.simulation.tracking.rule import (
@@ -37,7 +44,7 @@ from ppafo.simulation.tracking.rule import (
     shortfall,
 )
 from ppafo.simulation.tracking.settled import settled_walk, task_parts
-from ppafo.units.shown import in_units, units_in_force
+from ppafo.units.shown import in_units
 from ppafo.wording import override_text, without_exponent
 
 if TYPE_CHECKING:
@@ -70,14 +77,11 @@ class Tracking:
     not follow, else "". ``criterion`` names the ``number`` that decided, with its ``limit``; both are None without it.
     ``said`` is the sentence on a run that follows or is not judged.
 
-    Of a run that does not follow, ``error`` is the RMS error of the judged part, ``wanted`` the wanted change,
-    ``missing`` the mean error and ``moved`` the range of the value, all in SI of the ``controlled`` quantity. In the
-    time ``per`` reversals are counted. ``cause`` is the cause, with ``advice``; ``remedies`` are the remedies,
-    most promising first; ``others`` are further, less certain causes; ``tried`` is the result of tried remedies, and
-    ``mended`` the overrides with which the run follows. ``accepted`` is the scenario's reason for a torque beyond
-    reach, if that alone keeps the run from its reference, else "". ``at_rest`` is true if the reference stands still.
-    ``since`` [s] is the start of the judged part, below 0 for a walk, and ``until`` [s] its end, 0 for the end of the
-    run.
+    Of a run that does not follow, ``found`` is the failure with the number that decided and its limit, and ``error``
+    the RMS error [SI] of the judged part, which ``when`` says. ``cause`` is the cause, with ``advice``; ``remedies``
+    are the remedies, most promising first; ``others`` are further, less certain causes; ``tried`` is the result of
+    tried remedies, and ``mended`` the overrides with which the run follows. ``accepted`` is the scenario's reason for a
+    torque beyond reach, if that alone keeps the run from its reference, else "".
     """
 
     follows: bool | None
@@ -88,11 +92,9 @@ class Tracking:
     criterion: Criterion | Literal[""] = ""
     number: float | None = None
     limit: float | None = None
+    found: str = ""
     error: float = 0.0
-    wanted: float = 0.0
-    missing: float = 0.0
-    moved: float = 0.0
-    per: str = ""
+    when: str = ""
     cause: str = ""
     advice: str = ""
     remedies: tuple[Remedy, ...] = ()
@@ -100,10 +102,6 @@ class Tracking:
     accepted: str = ""
     tried: str = ""
     mended: tuple[str, ...] = ()
-    at_rest: bool = True
-    since: float = 0.0
-    until: float = 0.0
-    units: Mapping[str, str] = field(default_factory=units_in_force, compare=False, repr=False)
 
     @property
     def fails(self) -> bool:
@@ -121,7 +119,6 @@ class Tracking:
         return bool(self.follows or self.accepted) or self.reason in NOTHING_TO_FOLLOW
 
     @property
-    @in_units(lambda tracking: tracking.units)
     def sentence(self) -> str:
         """Verdict in one line; "" if there is nothing to follow."""
         if not self.fails:
@@ -131,42 +128,6 @@ class Tracking:
         untried = f"to try{order}: {'; '.join(remedies)}" if remedies else self.advice
         last = f"intended: {self.accepted}" if self.accepted else self.tried or untried
         return "; ".join(filter(None, (self.found, self.cause, last)))
-
-    @property
-    @in_units(lambda tracking: tracking.units)
-    def found(self) -> str:
-        """Failure with the number that decided and its limit, without cause and remedy."""
-        if self.number is None or self.limit is None:
-            return ""
-        words, since = CONTROLLED[self.controlled].words, time_text(self.since, self.until)
-        error, wanted, moved = (change_text(self.controlled, each) for each in (self.error, self.wanted, self.moved))
-        plain_moved = moved.partition(" ")[0]
-        if self.criterion in ("reversals", "command reversals"):
-            rounded = _distinct(lambda each, digits: float(f"{each:.{digits}g}"), self.number, self.limit)
-            often, most = (without_exponent(each, ".3g") for each in rounded)
-            span = " of the whole run" * (self.criterion == "command reversals")
-            allowed = f"{often} {self.criterion} a {self.per}{span} ({most} allowed)"
-            return f"the {words} loop oscillates: {allowed}, RMS error {error} (requested {wanted}){since}"
-        with_unit = partial(change_text, self.controlled)
-        number, limit = _distinct(with_unit, self.number, self.limit)
-        if self.kind == "does not move":
-            return (
-                f"the {words} loop does not move: {plain_moved} of the requested {wanted}{since * (self.until > 0.0)}"
-            )
-        if self.kind == "oscillates":
-            if self.criterion == "swing":
-                return f"the {words} swings by {number} ({limit} allowed; requested change {wanted}){since}"
-            return f"the {words} loop oscillates: {self.criterion} {number} ({limit} allowed){since}"
-        if self.kind == "overshoots":
-            return f"the {words} overshoots: {plain_moved} instead of at most {wanted} ({limit} allowed)"
-        is_constant = abs(self.missing) > max(0.9 * self.error, self.limit)
-        if is_constant and self.at_rest and self.criterion in ("RMS error", "mean error"):
-            side = "below" if self.missing < 0.0 else "above"
-            missing, allowed = _distinct(with_unit, abs(self.missing), self.limit)
-            begins = f"{since.strip()} " if self.until > 0.0 else ""
-            return f"{begins}the {words} stays {missing} {side} its reference ({allowed} allowed)"
-        criterion = CRITERION_TEXTS.get(self.criterion, self.criterion)
-        return f"the {words} does not follow its reference: {criterion} {number} ({limit} allowed){since}"
 
 
 def _distinct(form: Callable[[float, int], Any], number: float, limit: float) -> tuple[Any, Any]:
@@ -197,56 +158,84 @@ def tracking_in(result: "RecordedResult") -> Tracking:
 
 def _failing(case: Case, turning: float, rate: float) -> Tracking:
     """Verdict on a run that does not follow; ``turning`` and ``rate`` [1/s] as of ``_judged``."""
-    scenario, settled, is_task = case.scenario, case.settled, case.scenario.follows_reference
     assert case.failure is not None
-    found = (find(case) for find in (CAUSES_OF_TASK if is_task else CAUSES_OF_WALK))
-    cause, *others = (each for each in found if each is not None)
-    stride_time, overshoots = scenario.motion.stride_time, case.failure == "overshoots"
-    criterion, number, limit = _decided(case, turning, rate)
-    wanted = scenario.controller.settings["largest_torque"] if overshoots and not is_task else settled.wanted_change
+    cause, *others = (causes_of_task if case.scenario.follows_reference else causes_of_walk)(case)
+    criterion, number, limit, found = _decided(case, turning, rate)
     return Tracking(
         follows=False,
-        controlled=scenario.controlled,
+        controlled=case.scenario.controlled,
         kind=case.failure,
         criterion=criterion,
         number=number,
         limit=limit,
-        error=settled.rms_error,
-        wanted=min(wanted, extent(case.recording)) if is_task else wanted,
-        missing=settled.mean_error,
-        moved=settled.peak if overshoots else settled.value_range,
-        per="stride" if stride_time else "second",
+        found=found,
+        error=case.settled.rms_error,
+        when=_time_text(case.settled),
         cause=cause.text,
         advice=cause.advice,
         remedies=tuple(sorted(cause.remedies, key=rank)),
         others=tuple(other for other in others if other.remedies and other.text != cause.text),
-        accepted=scenario.beyond_reach if case.is_for_reach else "",
-        at_rest=bool(settled.rests) and not case.is_approaching,
-        since=settled.start,
-        until=settled.end,
+        accepted=case.scenario.beyond_reach if case.is_for_reach else "",
     )
 
 
-def _decided(case: Case, turning: float, rate: float) -> _Judged:
-    """Criterion of a failure, with the number that decided and its limit [SI; of reversals per second or stride]."""
-    settled, failure, per = case.settled, case.failure, case.scenario.motion.stride_time or 1.0
-    if failure == "does not move":
-        return "movement", settled.value_range, SMALLEST_MOVE * settled.wanted_change
-    if failure == "overshoots":
-        walks = not case.scenario.follows_reference
-        largest = case.scenario.controller.settings["largest_torque"] if walks else settled.wanted_change
-        return "peak", settled.peak, (LARGEST_PEAK_WALK if walks else LARGEST_PEAK) * largest
+def _decided(case: Case, turning: float, rate: float) -> tuple[Criterion, float, float, str]:
+    """Criterion of a failure, number and limit that decided [SI; of reversals per second or stride], all in words."""
+    scenario, settled, when = case.scenario, case.settled, _time_text(case.settled)
+    walks, text = not scenario.follows_reference, partial(change_text, scenario.controlled)
+    words, change = CONTROLLED[scenario.controlled].words, settled.wanted_change
+    wanted = text(change if walks else min(change, extent(case.recording)))
+    if case.failure == "does not move":
+        moved, at = text(settled.value_range).partition(" ")[0], when * (settled.end > 0.0)
+        found = f"the {words} loop does not move: {moved} of the requested {wanted}{at}"
+        return "movement", settled.value_range, SMALLEST_MOVE * change, found
+    if case.overshoots:
+        largest = scenario.controller.settings["largest_torque"] if walks else change
+        limit = (LARGEST_PEAK_WALK if walks else LARGEST_PEAK) * largest
+        peak, most = text(settled.peak).partition(" ")[0], text(largest) if walks else wanted
+        allowed = _distinct(text, settled.peak, limit)[1]
+        return (
+            "peak",
+            settled.peak,
+            limit,
+            f"the {words} overshoots: {peak} instead of at most {most} ({allowed} allowed)",
+        )
     criteria = _criteria(case)
-    if failure == "oscillates":
-        if turning > 1.0:
-            return "reversals" if is_noisy(case.scenario) else "command reversals", rate * per, rate / turning * per
-        swing = next(each for each in criteria if each[0] == "swing")
+    criterion, number, limit = next((each for each in criteria if each[1] > each[2]), criteria[-1])
+    if case.oscillates:
+        swing = next((each for each in criteria if each[0] == "swing"), criteria[0])
         is_swing = swing[1] > swing[2] and (not case.only_switches or criteria[0][1] <= criteria[0][2])
-        if settled.error_reversals > MOST_REVERSALS and not is_swing and not case.only_switches:
-            return "reversals", settled.error_reversals / settled.duration, MOST_REVERSALS / settled.duration
-        if is_swing:
-            return swing
-    return next((each for each in criteria if each[1] > each[2]), criteria[-1])
+        reverses = settled.error_reversals > MOST_REVERSALS and not is_swing and not case.only_switches
+        if turning > 1.0 or reverses:
+            is_of_command = turning > 1.0 and not is_noisy(scenario)
+            criterion = "command reversals" if is_of_command else "reversals"
+            per = scenario.motion.stride_time or 1.0
+            number, limit = (
+                (rate * per, rate / turning * per)
+                if turning > 1.0
+                else (settled.error_reversals / settled.duration, MOST_REVERSALS / settled.duration)
+            )
+            rounded = _distinct(lambda each, digits: float(f"{each:.{digits}g}"), number, limit)
+            often, most = (without_exponent(each, ".3g") for each in rounded)
+            span = f"a {'stride' if scenario.motion.stride_time else 'second'}{' of the whole run' * is_of_command}"
+            found = f"{often} {criterion} {span} ({most} allowed), RMS error {text(settled.rms_error)}"
+            return criterion, number, limit, f"the {words} loop oscillates: {found} (requested {wanted}){when}"
+        criterion, number, limit = swing if is_swing else (criterion, number, limit)
+    found, allowed = _distinct(text, number, limit)
+    if case.oscillates and criterion == "swing":
+        said = f"the {words} swings by {found} ({allowed} allowed; requested change {wanted}){when}"
+    elif case.oscillates:
+        said = f"the {words} loop oscillates: {criterion} {found} ({allowed} allowed){when}"
+    else:
+        name = CRITERION_TEXTS.get(criterion, criterion)
+        said = f"the {words} does not follow its reference: {name} {found} ({allowed} allowed){when}"
+    missing, is_at_rest = settled.mean_error, settled.rests and not case.is_approaching
+    is_constant = abs(missing) > max(0.9 * settled.rms_error, limit) and criterion in ("RMS error", "mean error")
+    if not case.oscillates and is_at_rest and is_constant:
+        found, allowed = _distinct(text, abs(missing), limit)
+        begins, side = f"{when.strip()} " if settled.end > 0.0 else "", "below" if missing < 0.0 else "above"
+        said = f"{begins}the {words} stays {found} {side} its reference ({allowed} allowed)"
+    return criterion, number, limit, said
 
 
 def _following(case: Case, _turning: float, _rate: float) -> Tracking:
@@ -254,9 +243,10 @@ def _following(case: Case, _turning: float, _rate: float) -> Tracking:
     scenario, settled, controlled = case.scenario, case.settled, CONTROLLED[case.scenario.controlled]
     criteria = _criteria(case)
     name, number, limit = max(criteria, key=lambda each: each[1] / max(each[2], _LEAST))
-    verdict = Tracking(True, controlled.name, "", "", "", name, number, limit, since=settled.start)
+    verdict = Tracking(True, controlled.name, "", "", "", name, number, limit)
+    since = _time_text(settled)
     if settled.is_undecided:
-        left = f"with an RMS error of {change_text(controlled.name, settled.rms_error)}{time_text(settled.start)}"
+        left = f"with an RMS error of {change_text(controlled.name, settled.rms_error)}{since}"
         if settled.ends_on_ramp:
             said = _undecided_text(scenario, f"the run ends on the ramp of its reference, {left}")
         else:
@@ -280,7 +270,7 @@ def _following(case: Case, _turning: float, _rate: float) -> Tracking:
         is_limited = limit < _UNLIMITED * settled.wanted_change
         errors.append(f"{each} {error_text}" + (f" ({limit_text} allowed{reason})" if is_limited else ""))
     # The interval stands before the errors: metrics of the same names cover the whole run.
-    said = f"the {controlled.words} follows its reference;{time_text(settled.start)}: {', '.join(errors)}"
+    said = f"the {controlled.words} follows its reference;{since}: {', '.join(errors)}"
     # A reference just beyond reach is missed by no more than is allowed.
     beyond = torque_beyond_reach(case) if scenario.follows_reference else None
     return replace(verdict, said=said if beyond is None else f"{said}; {beyond.text}")
@@ -331,12 +321,13 @@ def _undecided_text(scenario: Scenario, reason: str) -> str:
     return f"no verdict on the {CONTROLLED[scenario.controlled].words}: {reason}; not tried: {remedy} should give one"
 
 
-def time_text(since: float, until: float = 0.0) -> str:
-    """Words for the judged part: of a task from and to times [s], of a walk, below 0, where a torque is requested."""
-    if until > 0.0:
-        return f" from {since:.3g} s to {until:.3g} s"
-    where = " in push-off" if since == IN_PUSH_OFF else " where a torque is requested"
-    return f" from {since:.3g} s on" if since >= 0.0 else where
+def _time_text(settled: SettledPart) -> str:
+    """Words for the judged part: of a task its times, of a walk where a torque is requested."""
+    since = f" from {settled.start:.3g} s"
+    if settled.end > 0.0:
+        return f"{since} to {settled.end:.3g} s"
+    where = " in push-off" if settled.start == IN_PUSH_OFF else " where a torque is requested"
+    return f"{since} on" if settled.start >= 0.0 else where
 
 
 def _judged(result: "RecordedResult") -> tuple[Case, float, float] | None:
@@ -345,7 +336,7 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float] | None:
     The case is that of the last part of the reference, or of the worst earlier one if it fails more. The further
     numbers are the command reversals divided by the limit [-], and the reversals per second that were counted.
     """
-    scenario, law, recording = result.scenario, result.scenario.law, result.recording
+    scenario, recording = result.scenario, result.recording
     reversals = result.metrics[REVERSALS].value if REVERSALS in result.metrics else 0.0
     per, most = max(recording.duration, 1.0), most_reversals(scenario, recording.duration)
     if not scenario.follows_reference:
@@ -355,10 +346,14 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float] | None:
             return None
         turning, rate = reversals / most, reversals / recording.duration
         failure = failure_of_walk(settled, turning, limit)
-        return Case(scenario, law, recording, settled, failure), turning, rate
+        return Case(scenario, recording, settled, failure), turning, rate
     parts = task_parts(scenario, recording)
     counted = parts[0].command_reversal_rate * per if is_noisy(scenario) else reversals
-    turning, beyond, switches = counted / most, float(np.max(shortfall(scenario))), only_switches(scenario, law)
+    turning, beyond, switches = (
+        counted / most,
+        float(np.max(shortfall(scenario))),
+        only_switches(scenario, scenario.law),
+    )
     ratios = [excess_of_part(part, switches, beyond) for part in parts]
     # An earlier part decides where it fails and the last one does not, or fails less.
     largest = [
@@ -369,8 +364,8 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float] | None:
     excess, settled = ratios[place], parts[place]
     failure = failure_of_task(excess, turning)
     is_for_reach = bool(misses_for_reach(scenario, parts, turning)[0])
-    case = Case(scenario, law, recording, settled, failure, is_for_reach)
+    case = Case(scenario, recording, settled, failure, is_for_reach)
     # No oscillation: an error at the cut peaks of a wave, which reverses more often than the wave, and a slow approach.
     if failure == "oscillates" and turning <= 1.0 and (cuts_wave(case) or case.is_approaching):
-        case = case._replace(failure="does not follow")
+        case = replace(case, failure="does not follow")
     return case, turning, counted / per
