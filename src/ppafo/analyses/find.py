@@ -196,7 +196,9 @@ def _range(text: str, base: Scenario) -> tuple[ask.VariedPath, float, float]:
     with refused_as(StudyError, quoted, ScenarioError, UnitError):
         path = ask.varied_path(name, base, [upper])
         if path.quantity.whole:
-            raise StudyError(f"{quoted}: {name} takes whole numbers alone, which a study varies: [[vary]] kind = 'list'")
+            raise StudyError(
+                f"{quoted}: {name} takes whole numbers alone, which a study varies: [[vary]] kind = 'list'"
+            )
         # As in '20..90 psi_g': the low end has the unit of the high one unless it says its own.
         if not ask.split_quantity(lower)[1]:
             lower = f"{lower} {ask.split_quantity(upper)[1]}".rstrip()

@@ -153,9 +153,9 @@ def check_regulated(device: Device, law: ControllerKind, controlled: str) -> Non
     device.check_pressurised(f"a valve of kind '{valve}'")
     believes = law.plan is not None or any(item.name == "valve_conductance" for item in law.quantities)
     if law.needs_reference and (believes or (controlled == ANGLE and TORQUE in law.controls)):
+        other = "cascade" if controlled == ANGLE else "pid"
         raise ParameterError(
-            f"the controller '{law.name}' opens a valve for a flow, but one of kind '{valve}' sets a pressure; set "
-            f"controller.kind to '{'cascade' if controlled == ANGLE else 'pid'}'"
+            f"'{valve}' sets a pressure, '{law.name}' asks for a flow; set controller.kind to '{other}'"
         )
 
 
@@ -223,10 +223,7 @@ def _reference(reading: DocumentReader, controlled: str, atmosphere: float) -> t
     if "reference" not in reading.document:
         law = kind_at(reading.document, "controller")
         if CONTROLLERS[law].needs_reference:
-            raise ScenarioError(
-                f"{reading.file}: 'reference' is missing: controller.kind = '{law}' follows a reference; give "
-                "[reference] with its kind and settings"
-            )
+            raise ScenarioError(f"{reading.file}: 'reference' is missing: controller.kind = '{law}' follows one")
         return _NO_REFERENCE, {}
     kind = kind_at(reading.document, "reference")
     settings = reference_settings(kind, controlled)
@@ -243,9 +240,7 @@ def read_gas_model(reading: DocumentReader) -> GasModel | None:
         return None
     model = GasModel(**reading.section("gas_model", THERMAL_GAS))
     if model.heat_transfer_coefficient > 0.0 and value_at(reading.document, WALL_AREA) is None:
-        raise ScenarioError(
-            f"{reading.file}: '{WALL_AREA}' is missing, but required because heat_transfer_coefficient is above 0"
-        )
+        raise ScenarioError(f"{reading.file}: '{WALL_AREA}' is missing: heat_transfer_coefficient is above 0")
     return model
 
 

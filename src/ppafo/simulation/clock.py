@@ -54,27 +54,21 @@ def read_clock(reading: DocumentReader) -> tuple[float, float, float, float]:
     output = reading.number(_OUTPUT_PATH, _OUTPUT) if has_output else output_unless_given(duration, period, step)
     if has_output:
         if output < step * (1.0 - _RELATIVE):
-            raise reading.refusal(
-                _OUTPUT_PATH,
-                f"must not be below {_STEP_PATH} = {shown_text(step, 's', unit='s')}; reduce the step or record less",
-            )
+            least = f"{_STEP_PATH} = {shown_text(step, 's', unit='s')}"
+            raise reading.refusal(_OUTPUT_PATH, f"must not be below {least}; reduce the step or record less")
         _not_above(reading, _OUTPUT_PATH, output, duration, until)
         count = duration / output
         if abs(count - round(count)) > _RELATIVE * count:
             raise reading.refusal(_OUTPUT_PATH, f"must divide {until} evenly, not {count:.6g} times")
     used = dividing_step(period, step)
     if duration / used > MAXIMUM_STEPS:
-        raise reading.refusal(
-            _DURATION_PATH,
-            f"with a step of {shown_text(used, 's', unit='s')} the run has {duration / used:.3g} steps, at most "
-            f"{MAXIMUM_STEPS:.0e} are allowed: shorten the run or increase {_STEP_PATH}",
+        many = (
+            f"the run has {duration / used:.3g} steps, at most {MAXIMUM_STEPS:.0e}: shorten it or increase {_STEP_PATH}"
         )
+        raise reading.refusal(_DURATION_PATH, many)
     if duration / output > MAXIMUM_OUTPUTS:
-        raise reading.refusal(
-            _DURATION_PATH,
-            f"recorded every {shown_text(output, 's', unit='s')} the run has {duration / output:.3g} samples, at most "
-            f"{MAXIMUM_OUTPUTS:.0e} are allowed: increase {_OUTPUT_PATH}",
-        )
+        many = f"the run has {duration / output:.3g} samples, at most {MAXIMUM_OUTPUTS:.0e}: increase {_OUTPUT_PATH}"
+        raise reading.refusal(_DURATION_PATH, many)
     return duration, used, output, period
 
 

@@ -229,10 +229,7 @@ def section_of(document: Mapping[str, Any]) -> MotionSection | None:
     kind = kind_at(document, "motion")
     with refused_as(KindError, "motion.kind", KindError):
         if is_walk(kind):
-            raise KindError(
-                "a walk needs a walk file, not a scenario file, which moves the vane only; 'ppafo new walk' writes a "
-                "walk file"
-            )
+            raise KindError("a walk needs a walk file, not a scenario file; 'ppafo new walk' writes a walk file")
     motion = named(MOTIONS, document, "motion")
     return None if motion is None else motion.section
 

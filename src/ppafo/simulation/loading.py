@@ -90,9 +90,7 @@ def scenario_or_load(
     if not isinstance(scenario, Scenario):
         return load(scenario, overrides)
     if tuple(overrides):
-        raise ScenarioError(
-            f"{scenario.name}: a loaded scenario accepts no overrides; give the overrides when loading the scenario"
-        )
+        raise ScenarioError(f"{scenario.name}: a loaded scenario accepts no overrides; give them when loading it")
     check_parts(scenario)
     return scenario
 

@@ -255,9 +255,7 @@ def _read_leg(reading: DocumentReader, folder: Path) -> FreeMotion:
     if kind != GAIT_SHANK:
         if not PROFILES[kind].is_smooth:
             smooth = ", ".join([name for name, profile in PROFILES.items() if profile.is_smooth] + [GAIT_SHANK])
-            raise reading.refusal(
-                f"{_SHANK}.kind", f"this profile has corners where the angular velocity jumps; use {smooth}"
-            )
+            raise reading.refusal(f"{_SHANK}.kind", f"this profile has corners; use {smooth}")
         return FreeMotion(*start, leg=Leg(**numbers, shank=shank))
     name = str(value_at(reading.document, f"{_SHANK}.gait"))
     try:

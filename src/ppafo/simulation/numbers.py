@@ -169,8 +169,7 @@ def _moved(scenario: Scenario, replaced: Mapping[str, Any]) -> tuple[dict[str, A
             continue
         if missing:
             raise ScenarioError(
-                f"{scenario.name}: {' and '.join(paths)} take the place of the other form together: also give "
-                f"{' and '.join(missing)}, or set both before"
+                f"{scenario.name}: {' and '.join(paths)} change together: also give {' and '.join(missing)}"
             )
         kind = SonicOrifice if "sonic_conductance" in form else Orifice
         orifice = kind(**{name: replaced[f"{section}.{name}"] for name in form})

@@ -45,9 +45,7 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
         # A comparison that was meant to be a command is a bool, which Python takes for a whole number.
         is_number = isinstance(command, int | float | np.floating) and not isinstance(command, bool)
         if not is_number or not math.isfinite(command):
-            raise SimulationError(
-                f"{name}.update returned {command!r} at t = {run.time:.6g} s; it must return a finite number"
-            )
+            raise SimulationError(f"{name}.update returned {command!r} at t = {run.time:.6g} s, not a finite number")
         limited = VENT if walks and command > VENTS_ABOVE else max(-1.0, min(1.0, float(command)))
         if limited != command and type(controller) not in _REPORTED_CLASSES:
             _REPORTED_CLASSES.add(type(controller))

@@ -442,10 +442,8 @@ class Scenario:
                 found = getattr(controller, method, None)
             if not callable(found):
                 kind = type(controller).__name__
-                raise ScenarioError(
-                    f"{self.name}: a controller of type {kind} has no method '{method}'; it needs 'reset()' and "
-                    f"'update(time, reference, measurement)', the latter returning a command from -1 to 1"
-                )
+                needs = "it needs 'reset()' and 'update(time, reference, measurement)'"
+                raise ScenarioError(f"{self.name}: a controller of type {kind} has no method '{method}'; {needs}")
         # A law that requests a torque in a walk leaves its request to the object.
         names, settings = [quantity.name for quantity in ASSISTING_QUANTITIES], self.controller.settings
         requests = self.motion.motion_kind.layout == WALK and settings.keys() >= set(names)

@@ -178,7 +178,7 @@ def test_the_value_rests_on_many_noise_streams_and_not_on_the_seed_of_the_scenar
     assert found[0].value / BAR == pytest.approx(5.3 + noise(streams).mean(), abs=8.0 * ACCURACY)
     assert found[1].value == found[0].value
     assert f"it varies by {noise(streams).std(ddof=1):.3g} N m" in found[0].remarks[-1]
-    with pytest.raises(StudyError, match="sensors.seed takes whole numbers alone"):
+    with pytest.raises(StudyError, match="seed takes whole numbers alone"):
         find(TASK, vary="sensors.seed=1..4", such_that="follows")
 
 

@@ -129,17 +129,13 @@ def _check_channel(base: Scenario, name: str) -> None:
         raise ScenarioError(f"{base.name}: the channel '{name}' cannot be traced{_hint(name, TRACED)}")
     controlled = next((kind.name for kind in CONTROLLED.values() if kind.reference == name), base.controlled)
     if controlled != base.controlled:
-        raise ScenarioError(
-            f"{base.name}: '{name}' cannot be traced: it does not exist with reference.of = '{base.controlled}'"
-        )
+        raise ScenarioError(f"{base.name}: '{name}' cannot be traced: reference.of = '{base.controlled}'")
     if name == CONTROLLED[controlled].reference and base.controller.is_open_loop:
         raise ScenarioError(f"{base.name}: '{name}' cannot be traced: a constant command has no reference")
     if name in OF_SECOND_CHAMBER and base.device.actuator.has_one_chamber:
         raise ScenarioError(f"{base.name}: '{name}' cannot be traced: {base.device.name} has only one chamber")
     if name.startswith("temperature_") and base.gas_model is None:
-        raise ScenarioError(
-            f"{base.name}: '{name}' needs a gas model with an energy balance ([gas_model] kind = \"thermal\")"
-        )
+        raise ScenarioError(f"{base.name}: '{name}' needs an energy balance: gas_model.kind = 'thermal'")
 
 
 def _hint(name: str, known: Mapping[str, object]) -> str:

@@ -82,9 +82,7 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
         values[path] = np.ascontiguousarray(column, dtype=np.float64)
     shapes = {path: column.shape for path, column in values.items()}
     if len(set(shapes.values())) != 1 or any(len(shape) != 1 or shape[0] == 0 for shape in shapes.values()):
-        raise ScenarioError(
-            f"{base.name}: an ensemble needs columns of equal length with one value per run, not {shapes or 'none'}"
-        )
+        raise ScenarioError(f"{base.name}: needs columns of equal length, not {shapes or 'none'}")
     pair = in_two_forms(values)
     if pair is not None:
         raise ScenarioError(f"{base.name}: '{pair[0]}' and '{pair[1]}' cannot both vary: {either(pair[0])}")

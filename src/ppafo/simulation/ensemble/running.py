@@ -158,10 +158,8 @@ def _meter_batch(plain: Batch, members: Members, request: OutputRequest) -> _Met
     stride = max(1, round(request.every / float(interval[0]))) if request.bands else 1
     # Runs of one batch may have other steps, but traces are rows of one array.
     if request.bands and np.abs(stride * interval - request.every).max() > _SAME_INTERVAL * request.every:
-        raise ScenarioError(
-            f"traces every {request.every:.6g} s need one run.output_interval for all runs, a divisor of "
-            f"{request.every:.6g} s, not {interval.min():.6g} to {interval.max():.6g} s; change run.output_interval"
-        )
+        found = f"{interval.min():.6g} to {interval.max():.6g} s"
+        raise ScenarioError(f"run.output_interval = {found}: all runs need one that divides {request.every:.6g} s")
     # Metrics read from traces need every sample; bands alone need only those at which they are drawn.
     trace_every, band_stride = (1, stride) if read_from_traces else (stride, 1)
     traced = sorted({*read_from_traces, *request.bands})

@@ -34,10 +34,8 @@ def check_gaps(recording: Recording, file: str) -> None:
     """Raise DataError, prefixed with ``file``, for a recording with a gap too long for its inputs to be known."""
     index, duration = longest_gap(recording.time) or (0, 0.0)
     if duration > LONGEST_GAP:
-        raise DataError(
-            f"{file}: there is a gap of {duration:.4g} s after {recording.time[index]:.6g} s (sample "
-            f"{index + 1}), in which the inputs are not known; cut the recording there"
-        )
+        after = f"after {recording.time[index]:.6g} s (sample {index + 1})"
+        raise DataError(f"{file}: there is a gap of {duration:.4g} s {after}: cut the recording there")
 
 
 def check_command(recording: Recording, file: str) -> None:
@@ -45,10 +43,7 @@ def check_command(recording: Recording, file: str) -> None:
     command = recording[COMMAND]
     worst = int(np.argmax(np.abs(command)))
     if abs(command[worst]) > 1.0 + _COMMAND_TOLERANCE:
-        raise DataError(
-            f"{file}: '{COMMAND}' is {command[worst]:.6g} in sample {worst + 1}; it must be from -1 to 1, the fraction "
-            "of full opening"
-        )
+        raise DataError(f"{file}: '{COMMAND}' is {command[worst]:.6g} in sample {worst + 1}; it must be from -1 to 1")
 
 
 def check_absolute(recording: Recording, atmosphere: float, file: str) -> None:

@@ -23,5 +23,5 @@ def test_temperatures_are_traced_where_there_is_an_energy_balance_and_refused_el
     alone = simulate("torque-task-proportional", over(THERMAL, ["gas_model.heat_transfer_coefficient=40 W/(m^2 K)"]))
     assert traced.traces["temperature_1"][:, 1] == pytest.approx(alone.recording["temperature_1"][::100], rel=1e-11)
     isothermal = load_scenario("torque-task-proportional")
-    with pytest.raises(ScenarioError, match="'temperature_1' needs a gas model with an energy balance"):
+    with pytest.raises(ScenarioError, match="'temperature_1' needs an energy balance"):
         run_ensemble(isothermal, {"supply.pressure": np.array([5e5])}, ("rms_error",), ("temperature_1",))
