@@ -142,10 +142,6 @@ SHAPES: "Mapping[str, Callable[[Axes, Mark, Any, Any], object]]" = {
     "span": lambda axes, mark, x, _y: axes.axvspan(
         x[0], x[1], color=mark.colour, label=mark.label, **_AREA | dict(mark.style)
     ),
-    "strip": lambda axes, mark, _x, y: axes.axhspan(
-        y[0], y[1], color=mark.colour, label=mark.label, **_AREA | dict(mark.style)
-    ),
-    "upright": lambda axes, mark, x, y: axes.vlines(x, y[0], y[1], color=mark.colour, label=mark.label, **mark.style),
     "level": lambda axes, mark, _x, y: axes.axhline(y, color=mark.colour, label=mark.label, **mark.style),
     "at": lambda axes, mark, x, _y: axes.axvline(x, color=mark.colour, label=mark.label, **mark.style),
     # Cells and points by the thousand are kept as pixels: as shapes they would make files of many megabytes.
@@ -163,8 +159,8 @@ SHAPES: "Mapping[str, Callable[[Axes, Mark, Any, Any], object]]" = {
 """Drawing functions of marks by shape; arguments are axes, mark, and its positions in display units.
 
 ``line``, ``bars`` (edges and counts), ``reach`` (points with the half width ``to``), ``band`` (between two rows of y),
-``span`` and ``strip`` (between two x, two y), ``upright`` (line from one y to another), ``level`` and ``at``
-(horizontal and vertical line), ``text`` (the label), ``map`` and ``points`` (coloured by ``to``).
+``span`` (between two x), ``level`` and ``at`` (horizontal and vertical line), ``text`` (the label), ``map`` and
+``points`` (coloured by ``to``).
 """
 
 

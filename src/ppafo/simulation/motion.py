@@ -53,7 +53,15 @@ from ppafo.simulation.profiles import (
     profiles_of,
     read_profile,
 )
-from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice, Scenario, vane_motion
+from ppafo.simulation.scenario import (
+    FreeMotion,
+    Leg,
+    PrescribedMotion,
+    ProfileChoice,
+    Scenario,
+    locked_vane,
+    vane_motion,
+)
 from ppafo.simulation.vane_recording import measured_vane
 from ppafo.units.shown import shown_text
 from ppafo.wording import one_line
@@ -204,22 +212,20 @@ VaneKind = partial(
 """Motions of a vane alone, which differ in their section of the file, in the plan of a run and in what is recorded."""
 
 
-def _read_free(reading: DocumentReader, _folder: Path) -> FreeMotion:
-    numbers = reading.section("motion", FREE)
-    return FreeMotion(numbers["angle"], numbers["angular_velocity"], numbers["external_torque"])
-
-
-FREE_MOTION = VaneKind(name="free", section=MotionSection("the torques move the vane", FREE, _read_free))
+FREE_MOTION = VaneKind(
+    name="free",
+    section=MotionSection(
+        "the torques move the vane", FREE, lambda reading, _: FreeMotion(**reading.section("motion", FREE))
+    ),
+)
 """Free motion by equation (1), with a constant external torque."""
-
-
-def _read_locked(reading: DocumentReader, _folder: Path) -> PrescribedMotion:
-    return PrescribedMotion(ProfileChoice("constant", {"level": reading.number(LOCKED_ANGLE, ANGLE)}), "locked")
 
 
 LOCKED_MOTION = VaneKind(
     name="locked",
-    section=MotionSection("the vane stays at one angle", (ANGLE,), _read_locked),
+    section=MotionSection(
+        "the vane stays at one angle", (ANGLE,), lambda reading, _: locked_vane(reading.number(LOCKED_ANGLE, ANGLE))
+    ),
     places={LOCKED_ANGLE: ("motion", "profile", "level")},
 )
 """Vane clamped on a test bench: its profile is constant."""

@@ -116,11 +116,6 @@ class FreeMotion:
         return self.external_torque if self.leg is None else -self.leg.ankle_torque
 
     @property
-    def form(self) -> str:
-        """Form of the motion in words, independent of its numbers."""
-        return "free" if self.leg is None else f"free with the foot of a leg, shank motion `{self.leg.shank.kind}`"
-
-    @property
     def label(self) -> str:
         """Short description of the motion."""
         start = f"from {math.degrees(self.angle):.4g} deg"
@@ -158,17 +153,17 @@ class PrescribedMotion:
         return self.profile.level if self.profile.kind == "constant" else None
 
     @property
-    def form(self) -> str:
-        """Form of the motion in words, independent of its numbers."""
-        return f"prescribed, `{self.profile.kind}`"
-
-    @property
     def label(self) -> str:
         """Short description of the motion."""
         level = self.profile.settings.get("level", math.nan)
         if self.profile.kind == "constant":
             return f"locked at {math.degrees(level):.4g} deg"
         return f"prescribed, along the profile {self.profile.kind}"
+
+
+def locked_vane(angle: float) -> PrescribedMotion:
+    """Return the motion of a vane locked at an angle [rad]: both chambers have fixed volumes."""
+    return PrescribedMotion(ProfileChoice("constant", {"level": angle}), "locked")
 
 
 class Motion(Protocol):

@@ -17,9 +17,9 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.recorded.channels import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY, sample_period
 from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs, with_highest_supply, with_prescribed_angle
-from ppafo.simulation.recorded.replay import locked_vane, replay_scenario
+from ppafo.simulation.recorded.replay import replay_scenario
 from ppafo.simulation.recorded.rest import ReplayStart
-from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario, vane_motion
+from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario, locked_vane, vane_motion
 from ppafo.validation.measured import MeasuredRecording
 from ppafo.validation.settings import ANGLE, Motion, ReplaySettings
 

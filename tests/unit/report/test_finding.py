@@ -66,8 +66,6 @@ def test_every_shape_can_be_drawn() -> None:
         "bars": Mark("bars", [*x, 3.0], x),
         "band": Mark("band", x, ends),
         "span": Mark("span", (0.0, 1.0)),
-        "strip": Mark("strip", (), (0.0, 1.0)),
-        "upright": Mark("upright", x, ends),
         "level": Mark("level", (), 1.0),
         "at": Mark("at", 1.0),
         "map": Mark("map", x, x[:2], [x, x]),
@@ -81,7 +79,7 @@ def test_every_shape_can_be_drawn() -> None:
     figure = Finding("trial", "", "", [], [part], Numbers([])).plot()
     bars = [axes for axes in figure.axes if axes.get_label() == "<colorbar>"]
     assert [bar.get_ylabel() for bar in bars] == ["z"], "two panels of one scale share its bar"
-    assert len(figure.axes) == len(bars) + 12
+    assert len(figure.axes) == len(bars) + 10
 
 
 def test_an_interval_has_as_many_digits_as_tell_its_limits_apart() -> None:

@@ -44,7 +44,10 @@ def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
         followed.append(f"`{c_identifier(path)}` ({', '.join(sources)})")
     followers = _FOLLOWS.format(followers=", ".join(followed) or "none")
     if kind.layout != WALK:
-        motion = f"the reference, `{scenario.reference.kind}`, and the motion, {vane_motion(scenario).form}"
+        moved = vane_motion(scenario)
+        profile = moved.profile if moved.leg is None else moved.leg.shank
+        along = "" if profile is None else f" along `{profile.kind}`"
+        motion = f"the reference, `{scenario.reference.kind}`, and the motion, `{kind.name}`{along}"
         left_out = ", ".join(f"`{kind.name}`" for kind in METRICS.values() if kind.traced)
         return {
             "fixed": _listed([laws, motion, *of_both, _OF_TIMES]),

@@ -40,7 +40,7 @@ from ppafo.simulation.recorded.channels import (
 )
 from ppafo.simulation.recorded.inputs import between_stops, supply_paths, with_highest_supply
 from ppafo.simulation.recorded.motion import motion_at, read_error
-from ppafo.simulation.recorded.replay import locked_vane, replay_scenario, with_fixed_volume
+from ppafo.simulation.recorded.replay import replay_scenario, with_fixed_volume
 from ppafo.simulation.recorded.rest import start_of, value_at_rest
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.simulation.scenario import (
@@ -49,6 +49,7 @@ from ppafo.simulation.scenario import (
     FreeMotion,
     Scenario,
     Sensors,
+    locked_vane,
     vane_motion,
     with_control,
 )

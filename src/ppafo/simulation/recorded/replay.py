@@ -49,11 +49,6 @@ def replay_scenario(
     )
 
 
-def locked_vane(angle: float) -> PrescribedMotion:
-    """Return the motion of a vane locked at an angle [rad]: both chambers have fixed volumes."""
-    return PrescribedMotion(ProfileChoice("constant", {"level": angle}), "locked")
-
-
 def with_fixed_volume(device: Device, volume: float) -> tuple[Device, dict[str, float]]:
     """Return the device with a fixed volume [m^3] instead of chamber 1, and initial values for a replay [SI].
 
