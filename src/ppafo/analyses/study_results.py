@@ -112,6 +112,7 @@ class StudyResults:
         metrics: Mapping[str, Mapping[str, Mapping[str, Any]]] = self.summary["configurations"]
         return metrics
 
+    @checked
     def table(self, columns: Sequence[str] | None = None) -> ask.Rows:
         """Return the rows of all runs, or some of their columns, as arrays by name; SI units, nan for missing values.
 

@@ -326,6 +326,8 @@ _PLAIN: Mapping[Any, tuple[str, Callable[[Any], Any]]] = {
     # Where a name is accepted too, its converter comes first and takes texts.
     Path: ("a path", lambda value: Path(taken_text(os.fspath(value)))),
     Mapping[str, Any]: ("a dictionary with strings as keys", taken_document),
+    # The object of a method.
+    inspect.Parameter.empty: ("anything", lambda value: value),
 }
 """Description and converter of each type without a ``Word``."""
 

@@ -179,7 +179,7 @@ def test_the_results_are_the_same_with_any_number_of_runs_of_a_chunk(
     for name in ("summary.json", "bands.parquet"):
         assert (tmp_path / "out" / name).read_bytes() == (small_results.folder.path / name).read_bytes()
     for name, values in small_results.table(["rms_error", "supply.pressure"]).items():
-        np.testing.assert_array_equal(again.table([name])[name], values)
+        np.testing.assert_array_equal(again.table(name)[name], values)
 
 
 def cut(content: bytes) -> bytes:
