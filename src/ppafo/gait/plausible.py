@@ -5,14 +5,13 @@ because impaired walking often breaks the rules of healthy walking slightly. The
 in mid-stance, the knee by its rotation about the standing ankle.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.errors import DataError, PpafoError, check_all, noted_in, raise_noted
+from ppafo.errors import DataError, raise_noted
 from ppafo.gait.gait import HARMONICS, KNEE, REQUIRED, Gait, fit_curve
 from ppafo.signals.recording import Floats
 from ppafo.wording import without_exponent
@@ -102,39 +101,43 @@ class MeanStride:
 
 def check_plausible(walk: MeanStride) -> None:
     """Raise DataError for an implausible mean stride; the message names file, curve, number and limits."""
-    # A check in a chain is made only where those before it pass: a wrong unit would be refused again as a wrong sign.
-    chains = (
-        (check_stride_time,),
-        (check_stance, check_moment_time),
-        (check_shank, check_knee),
-        (check_knee_means,),
-        (check_ankle_range, check_shank, check_ankle),
-        (check_moment,),
-        (check_force,),
-        (check_centre_of_pressure,),
-    )
-    check_all([partial(check, walk) for check in chain] for chain in chains)
+    raise_noted([DataError(fault) for fault in _faults(walk)])
 
 
-def check_stride_time(walk: MeanStride) -> None:
-    """Raise DataError for a stride time that is implausible for walking."""
-    low, high = STRIDE_TIME
-    if not low <= walk.stride_time <= high:
-        raise DataError(
-            f"{walk.file['shank_angle']}: the stride time is {walk.stride_time:.3g} s (plausible: {low:g} to "
-            f"{high:g} s)"
-        )
+def _faults(walk: MeanStride) -> Iterator[str]:
+    """Yield the faults of a stride; a wrong unit is not told again as a wrong sign."""
+    yield from _outside(f"{walk.file['shank_angle']}: the stride time is {{}} s", walk.stride_time, STRIDE_TIME)
+    decides = "vertical_force" if "vertical_force" in walk.curves else "shank_angle"
+    share, limits = 100.0 * walk.stance_share, (100.0 * STANCE_FRACTION[0], 100.0 * STANCE_FRACTION[1])
+    said = f"{walk.file[decides]}: the foot is on the ground for {{}} % of the stride, by {decides}"
+    stance = [*_outside(said, share, limits)]
+    yield from stance or _of_moment_time(walk)
+    shank = [*_of_shank(walk)]
+    yield from shank
+    turning = [] if shank else [*_of_turning_knee(walk)]
+    yield from turning
+    # Without the last sample, which is the first phase again.
+    means = {name: float(np.mean(walk.curves[name][:-1])) for name in KNEE if name in walk.curves}
+    shifted = [
+        f"{walk.where(name)} has a mean of {mean:.3g} m/s^2, but must average to 0 over a stride (allowed: up to "
+        f"{KNEE_MEAN:g} m/s^2; gravity is not part of it)"
+        for name, mean in means.items()
+        if abs(mean) > KNEE_MEAN
+    ]
+    yield from shifted
+    for name in () if shank or turning or shifted else means:
+        yield from _of_knee_curve(walk, name)
+    ankle = [*range_faults(walk.where("ankle_angle"), walk.curves["ankle_angle"], ANKLE_RANGE)]
+    yield from ankle or ([] if shank else _of_ankle(walk))
+    yield from moment_faults(walk)
+    yield from _of_loads(walk)
 
 
-def check_stance(walk: MeanStride) -> None:
-    """Raise DataError for a stance fraction that is implausible for walking."""
-    low, high = STANCE_FRACTION
-    if not low <= walk.stance_share <= high:
-        decides = "vertical_force" if "vertical_force" in walk.curves else "shank_angle"
-        raise DataError(
-            f"{walk.file[decides]}: the foot is on the ground for {100.0 * walk.stance_share:.0f} % of the stride, by "
-            f"{decides} (plausible: {100.0 * low:.0f} to {100.0 * high:.0f} %)"
-        )
+def _outside(said: str, number: float, limits: tuple[float, float]) -> Iterator[str]:
+    """Yield what is ``said`` of a number that is outside of its plausible limits."""
+    low, high = limits
+    if not low <= number <= high:
+        yield f"{said.format(without_exponent(number, '.3g'))} (plausible: {low:g} to {high:g})"
 
 
 _FINE = np.linspace(0.0, 1.0, 1000, endpoint=False)
@@ -172,88 +175,70 @@ MIDSTANCE = slice(15, 41)
 """Mid-stance samples [percent of the stride], in which the foot stands and the ankle rotates with the shank."""
 
 
-def check_shank(walk: MeanStride) -> None:
-    """Raise DataError for a shank angle that no leg can have."""
-    phi = np.degrees(walk.curves["shank_angle"])
-    where = walk.where("shank_angle")
+def _of_shank(walk: MeanStride) -> Iterator[str]:
+    """Yield the faults of a shank angle that no leg can have."""
+    phi, where = np.degrees(walk.curves["shank_angle"]), walk.where("shank_angle")
     # The range is free of the zero, so that a wrong unit shows before a wrong zero.
-    travel = float(np.ptp(phi))
-    check_angle_range(where, travel, SHANK_RANGE)
+    ranges = [*range_faults(where, walk.curves["shank_angle"], SHANK_RANGE)]
     # Means of five samples at both ends: a single one may lie on a tremor.
     growth = float(np.mean(phi[MIDSTANCE][-5:]) - np.mean(phi[MIDSTANCE][:5]))
-    if growth > _TURNED_BACK * travel:
-        raise DataError(
+    if ranges:
+        yield from ranges
+    elif growth > _TURNED_BACK * float(np.ptp(phi)):
+        yield (
             f"{where} increases by {growth:.2g} deg in mid-stance, so the shank would rotate backwards over the foot: "
             "its sign is reversed, or a vertical force is of the other foot"
         )
-    if float(phi[0]) < -10.0 or float(np.mean(phi)) > 10.0 or float(np.mean(phi)) < -50.0:
-        raise DataError(
+    elif float(phi[0]) < -10.0 or float(np.mean(phi)) > 10.0 or float(np.mean(phi)) < -50.0:
+        yield (
             f"{where} is {phi[0]:.0f} deg at heel strike and {np.mean(phi):.0f} deg on average (plausible: above -10 "
             "deg at heel strike, and -50 to 10 deg on average; 0 is vertical, positive with the ankle in front of the "
             "knee)"
         )
 
 
-def check_angle_range(where: str, travel: float, limits: tuple[float, float], is_whole: bool = False) -> None:
-    """Raise DataError for an angle with an implausible range [deg]; a whole record has no upper limit."""
-    low, high = limits
-    if low <= travel and (is_whole or travel <= high):
-        return
-    likely = [
-        unit
-        for unit, number in (("radians", np.degrees(travel)), ("degrees", np.radians(travel)))
-        if low <= number <= high
-    ]
-    hint = "".join(f"; the numbers look like {unit}" for unit in likely)
-    raise DataError(f"{where} has a range of {travel:.3g} deg (plausible in a stride: {low:g} to {high:g} deg){hint}")
+def range_faults(where: str, angle: Floats, limits: tuple[float, float], is_whole: bool = False) -> Iterator[str]:
+    """Yield the fault of an angle [rad] with an implausible range [deg]; a whole record has no upper limit."""
+    (low, high), travel = limits, float(np.ptp(np.degrees(angle)))
+    if not low <= travel <= (np.inf if is_whole else high):
+        units = {"radians": np.degrees(travel), "degrees": np.radians(travel)}
+        hint = "".join(f"; the numbers look like {unit}" for unit, number in units.items() if low <= number <= high)
+        yield f"{where} has a range of {travel:.3g} deg (plausible in a stride: {low:g} to {high:g} deg){hint}"
 
 
-def check_ankle_range(walk: MeanStride) -> None:
-    """Raise DataError for an ankle angle with an implausible range."""
-    travel = float(np.ptp(np.degrees(walk.curves["ankle_angle"])))
-    check_angle_range(walk.where("ankle_angle"), travel, ANKLE_RANGE)
-
-
-def check_ankle(walk: MeanStride) -> None:
-    """Raise DataError for an ankle angle that is implausible together with the shank angle."""
-    where = walk.where("ankle_angle")
-    turned, reversed_turned = standing_turns(walk.curves["shank_angle"], walk.curves["ankle_angle"])
-    wrong: list[PpafoError] = []
-    is_reversed = turned > CLEARLY_BETTER * reversed_turned and turned > _TURNS
-    if is_reversed:
-        wrong.append(
-            DataError(
-                f"{where} moves into plantarflexion while the shank rotates forward: the flat foot would rotate by "
-                f"{turned:.2g} deg (RMS), but only by {reversed_turned:.2g} deg with the opposite sign, so the sign is "
-                "reversed"
-            )
+def _of_ankle(walk: MeanStride) -> Iterator[str]:
+    """Yield the faults of an ankle angle that is implausible together with the shank angle."""
+    shank, ankle = walk.curves["shank_angle"], walk.curves["ankle_angle"]
+    turned, reversed_turned = standing_turns(shank, ankle)
+    if turned > CLEARLY_BETTER * reversed_turned and turned > _TURNS:
+        yield (
+            f"{walk.where('ankle_angle')} moves into plantarflexion while the shank rotates forward: the flat foot "
+            f"would rotate by {turned:.2g} deg (RMS), but only by {reversed_turned:.2g} deg with the opposite sign, so "
+            "the sign is reversed"
         )
-    # A reversed sign turns the angle about 90 deg: the zero is wrong, too, where the foot is tilted even then.
-    ankle = np.pi - walk.curves["ankle_angle"] if is_reversed else walk.curves["ankle_angle"]
-    foot = standing_tilt(walk.curves["shank_angle"], ankle)
-    with noted_in(wrong):
-        _check_ankle_zero(walk, np.degrees(ankle), foot)
-    raise_noted(wrong)
+        # A reversed sign turns the angle about 90 deg: the zero is wrong, too, where the foot is tilted even then.
+        ankle = np.pi - ankle
+    yield from _of_ankle_zero(walk, np.degrees(ankle), standing_tilt(shank, ankle))
 
 
-def check_ankle_alone(walk: MeanStride) -> None:
-    """Raise DataError for an ankle angle, if there is one, whose range or zero is implausible beside any shank."""
+def ankle_faults_alone(walk: MeanStride) -> Iterator[str]:
+    """Yield the faults of an ankle angle, if there is one, whose range or zero is implausible beside any shank."""
     if "ankle_angle" in walk.curves:
-        check_ankle_range(walk)
-        _check_ankle_zero(walk, np.degrees(walk.curves["ankle_angle"]), 0.0)
+        angle = walk.curves["ankle_angle"]
+        ranges = [*range_faults(walk.where("ankle_angle"), angle, ANKLE_RANGE)]
+        yield from ranges or _of_ankle_zero(walk, np.degrees(angle), 0.0)
 
 
-def _check_ankle_zero(walk: MeanStride, theta: Floats, foot: float) -> None:
-    """Raise DataError for an ankle angle ``theta`` [deg] out of its limits, or a standing foot with a tilt [deg]."""
+def _of_ankle_zero(walk: MeanStride, theta: Floats, foot: float) -> Iterator[str]:
+    """Yield the fault of an ankle angle ``theta`` [deg] out of its limits, or of a standing foot with a tilt [deg]."""
     low, high = ANKLE_LIMITS
-    if abs(foot) <= REFUSED_TILT and low <= float(theta.min()) and float(theta.max()) <= high:
-        return
-    as_read = np.degrees(walk.curves["ankle_angle"])
-    tilt = f"implies a foot tilted by {foot:.0f} deg in mid-stance (plausible: up to {REFUSED_TILT:g} deg) and "
-    raise DataError(
-        f"{walk.where('ankle_angle')} {tilt if foot else ''}ranges from {as_read.min():.0f} to "
-        f"{as_read.max():.0f} deg (neutral: 90 deg)"
-    )
+    if abs(foot) > REFUSED_TILT or float(theta.min()) < low or float(theta.max()) > high:
+        as_read = np.degrees(walk.curves["ankle_angle"])
+        tilt = f"implies a foot tilted by {foot:.0f} deg in mid-stance (plausible: up to {REFUSED_TILT:g} deg) and "
+        yield (
+            f"{walk.where('ankle_angle')} {tilt if foot else ''}ranges from {as_read.min():.0f} to "
+            f"{as_read.max():.0f} deg (neutral: 90 deg)"
+        )
 
 
 def standing_tilt(shank: Floats, ankle: Floats) -> float:
@@ -324,75 +309,56 @@ def check_force_scale(file: str, force: Floats) -> None:
     # Percentiles, since a single spike has no sign to judge.
     lowest, highest = np.percentile(loaded if loaded.size else force, (2.0, 98.0)).tolist()
     # A reversed sign is looked for first: its peak would be refused as too small.
-    low, high = FORCE_PEAK
     if -lowest > CLEARLY_BETTER * highest:
         raise DataError(f"{file}: vertical_force peaks at {lowest:.3g} body weights, below 0, so its sign is reversed")
-    if not low <= highest <= high:
-        raise DataError(f"{file}: vertical_force reaches {highest:.3g} body weights (plausible: {low:g} to {high:g})")
+    for fault in _outside(f"{file}: vertical_force reaches {{}} body weights", highest, FORCE_PEAK):
+        raise DataError(fault)
 
 
-def check_moment(walk: MeanStride) -> None:
-    """Raise DataError for an implausible ankle moment; a stride without a moment passes."""
+def moment_faults(walk: MeanStride) -> Iterator[str]:
+    """Yield the fault of an implausible ankle moment, by its sign or else by its peak."""
+    if "ankle_moment" in walk.curves:
+        moment, where = walk.curves["ankle_moment"], walk.where("ankle_moment")
+        lowest, peak = float(np.min(moment)), float(np.max(moment))
+        if float(np.mean(moment)) < 0.0 and -lowest > CLEARLY_BETTER * peak:
+            yield f"{where} peaks at {lowest:.3g} N m/kg, in dorsiflexion, so its sign is reversed"
+        else:
+            yield from _outside(f"{where} reaches {{}} N m/kg", peak, MOMENT_PEAK)
+
+
+def _of_moment_time(walk: MeanStride) -> Iterator[str]:
+    """Yield the fault of an ankle moment that acts while the foot is off the ground."""
     if "ankle_moment" not in walk.curves:
         return
-    moment = walk.curves["ankle_moment"]
-    where = walk.where("ankle_moment")
-    if float(np.mean(moment)) < 0.0 and float(-np.min(moment)) > CLEARLY_BETTER * float(np.max(moment)):
-        raise DataError(f"{where} peaks at {np.min(moment):.3g} N m/kg, in dorsiflexion, so its sign is reversed")
-    peak, (low, high) = float(np.max(moment)), MOMENT_PEAK
-    if not low <= peak <= high:
-        raise DataError(
-            f"{where} reaches {without_exponent(peak, '.3g')} N m/kg (plausible: {low:g} to {high:g} N m/kg)"
-        )
-
-
-def check_moment_time(walk: MeanStride) -> None:
-    """Raise DataError for an ankle moment that acts while the foot is off the ground; skipped without a moment."""
-    if "ankle_moment" not in walk.curves:
-        return
-    moment = walk.curves["ankle_moment"]
-    peak, column = float(np.max(moment)), walk.where("ankle_moment")
-    fraction, phase = walk.stance_share, np.linspace(0.0, 1.0, moment.size)
+    moment, fraction = walk.curves["ankle_moment"], walk.stance_share
+    phase, peak = np.linspace(0.0, 1.0, moment.size), float(np.max(moment))
     at, swing = float(phase[np.argmax(moment)]), float(np.max(moment[phase > fraction + _AFTER_TOE_OFF]))
-    if at < fraction and swing < max(_LEFT_IN_SWING * peak, _FOOT_ALONE):
-        return
-    where = "" if at >= fraction else f" and is {swing:.2g} N m/kg in swing"
-    raise DataError(
-        f"{column} peaks at {100.0 * at:.0f} % of the stride{where}, but the foot is off the ground "
-        f"from {100.0 * fraction:.0f} % on: the moment is of the other foot, or has another clock"
-    )
-
-
-def check_force(walk: MeanStride) -> None:
-    """Raise DataError for a vertical force that is implausible for walking; a stride without a force passes."""
-    if "vertical_force" not in walk.curves:
-        return
-    force = walk.curves["vertical_force"]
-    where = walk.where("vertical_force")
-    peak, mean = float(np.max(force)), float(np.mean(force))
-    if not FORCE_PEAK[0] <= peak <= FORCE_PEAK[1] or not FORCE_MEAN[0] <= mean <= FORCE_MEAN[1]:
-        raise DataError(
-            f"{where} has a mean of {mean:.3g} body weights (plausible: {FORCE_MEAN[0]:g} to {FORCE_MEAN[1]:g}) and a "
-            f"peak of {peak:.3g} (plausible: {FORCE_PEAK[0]:g} to {FORCE_PEAK[1]:g})"
+    if at >= fraction or swing >= max(_LEFT_IN_SWING * peak, _FOOT_ALONE):
+        where = "" if at >= fraction else f" and is {swing:.2g} N m/kg in swing"
+        yield (
+            f"{walk.where('ankle_moment')} peaks at {100.0 * at:.0f} % of the stride{where}, but the foot is off the "
+            f"ground from {100.0 * fraction:.0f} % on: the moment is of the other foot, or has another clock"
         )
 
 
-def check_centre_of_pressure(walk: MeanStride) -> None:
-    """Raise DataError for a centre of pressure that no foot can have; a stride without one passes."""
-    if "centre_of_pressure" not in walk.curves:
-        return
-    place, (low, high) = walk.curves["centre_of_pressure"], UNDER_FOOT
-    back, front = float(np.min(place)), float(np.max(place))
-    if back < low or front > high or front - back < LEAST_ROLL:
-        raise DataError(
-            f"{walk.where('centre_of_pressure')} is {back:.3g} to {front:.3g} m in front of the ankle (plausible: "
-            f"within {low:g} to {high:g} m, and over {LEAST_ROLL:g} m or more)"
-        )
+def _of_loads(walk: MeanStride) -> Iterator[str]:
+    """Yield the faults of a vertical force, and of a centre of pressure that no foot can have."""
+    if "vertical_force" in walk.curves:
+        force, where = walk.curves["vertical_force"], walk.where("vertical_force")
+        yield from _outside(f"{where} has a mean of {{}} body weights", float(np.mean(force)), FORCE_MEAN)
+        yield from _outside(f"{where} has a peak of {{}} body weights", float(np.max(force)), FORCE_PEAK)
+    if "centre_of_pressure" in walk.curves:
+        place, (low, high) = walk.curves["centre_of_pressure"], UNDER_FOOT
+        back, front = float(np.min(place)), float(np.max(place))
+        if back < low or front > high or front - back < LEAST_ROLL:
+            yield (
+                f"{walk.where('centre_of_pressure')} is {back:.3g} to {front:.3g} m in front of the ankle (plausible: "
+                f"within {low:g} to {high:g} m, and over {LEAST_ROLL:g} m or more)"
+            )
 
 
 FOOT_FLAT = slice(15, 43)
 """Samples [percent of the stride] in which the foot stands flat."""
-
 
 _G = STANDARD_GRAVITY
 _FACTORS = {
@@ -445,17 +411,14 @@ _PARTS = {"knee_forward": ((-0.3, 0.0), (0.3, 0.6)), "knee_up": ((0.0, 0.3), (0.
 """Intervals about toe-off [fractions of the swing] of acceleration (forward, up) and of deceleration."""
 
 
-def check_knee(walk: MeanStride) -> None:
-    """Raise DataError for knee accelerations that no leg can have, by size, sign and rotation about the resting ankle.
-
-    A stride without accelerations passes.
-    """
+def _of_turning_knee(walk: MeanStride) -> Iterator[str]:
+    """Yield the fault of a knee that does not rotate about the resting ankle, or that has one acceleration alone."""
     there = [name for name in KNEE if name in walk.curves]
-    if not there:
-        return
     if len(there) == 1:
         (missing,) = set(KNEE) - set(there)
-        raise DataError(f"{walk.where(there[0])} needs {missing}; give both or neither")
+        yield f"{walk.where(there[0])} needs {missing}; give both or neither"
+    if len(there) < len(KNEE):
+        return
     expected = turning_about_ankle(walk.curves["shank_angle"], walk.stride_time)
     # Over a stride that repeats the mean is 0; gravity in it is refused elsewhere and must not hide a unit here.
     turned = np.stack([walk.curves[name] - np.mean(walk.curves[name][:-1]) for name in KNEE])[:, FOOT_FLAT]
@@ -464,41 +427,25 @@ def check_knee(walk: MeanStride) -> None:
         is_of_one_alone = factors[0][1] == factors[1][0] == 0.0 and factors[0][0] != factors[1][1]
         left = _misfit(np.array(factors) @ turned, expected)
         if left < min(_FITS, _LEFT_BY_ONE * missed) and not (walk.is_knee_one_marker and is_of_one_alone):
-            raise DataError(
+            yield (
                 f"{walk.where('knee_forward')} and knee_up differ by {100.0 * missed:.0f} % "
                 f"({100.0 * left:.0f} % if corrected) from a rotation of the knee about the resting ankle while the "
                 f"foot is flat; {remedy}"
             )
-    check_knee_means(walk)
-    check_all([partial(_check_knee_curve, walk, name)] for name in there)
+            return
 
 
-def check_knee_means(walk: MeanStride) -> None:
-    """Raise DataError for knee accelerations whose mean over a stride is not 0; skipped without accelerations."""
-    # Without the last sample, which is the first phase again.
-    means = {name: float(np.mean(walk.curves[name][:-1])) for name in KNEE if name in walk.curves}
-    raise_noted(
-        [
-            DataError(
-                f"{walk.where(name)} has a mean of {mean:.3g} m/s^2, but must average to 0 over a stride "
-                f"(allowed: up to {KNEE_MEAN:g} m/s^2; gravity is not part of it)"
-            )
-            for name, mean in means.items()
-            if abs(mean) > KNEE_MEAN
-        ]
-    )
-
-
-def _check_knee_curve(walk: MeanStride, name: str) -> None:
+def _of_knee_curve(walk: MeanStride, name: str) -> Iterator[str]:
+    """Yield the fault of a knee acceleration by its range or else by its sign, which shows in the swing."""
     values, where = walk.curves[name], walk.where(name)
-    travel, (low, high) = float(np.ptp(values)), KNEE_TRAVEL
-    if not low <= travel <= high:
-        raise DataError(f"{where} has a range of {travel:.3g} m/s^2 per stride (plausible: {low:g} to {high:g} m/s^2)")
+    travel = float(np.ptp(values))
+    ranges = [*_outside(f"{where} has a range of {{}} m/s^2 per stride", travel, KNEE_TRAVEL)]
+    yield from ranges
     # Gait phase of the swing, below 0 before toe-off.
     swung = (np.linspace(0.0, 1.0, values.size) - walk.stance_share) / (1.0 - walk.stance_share)
     driven, held = (float(np.mean(values[(swung >= start) & (swung <= end)])) for start, end in _PARTS[name])
-    if held - driven > _HELD_BACK * travel:
-        raise DataError(
+    if not ranges and held - driven > _HELD_BACK * travel:
+        yield (
             f"{where} is {driven:.3g} m/s^2 around toe-off and {held:.3g} m/s^2 in mid-swing, while walking has the "
             "opposite pattern: the sign is reversed, or the data are of the other knee"
         )

@@ -10,9 +10,7 @@ import pytest
 from ppafo.errors import DataError
 from ppafo.gait.plausible import stride_remarks
 from ppafo.gait.recorded import ImportSettings, import_gait
-from ppafo.gait.recorded.mapping import (
-    load_map,
-)
+from ppafo.gait.recorded.mapping import load_map
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 
@@ -100,7 +98,7 @@ CASES: dict[str, tuple[Change, str]] = {
     "knee times g": (scaled((FORWARD, UP), 9.80665), "divide both by 9.80665"),
     "knee in centimetres": (
         scaled((FORWARD, UP), 100.0),
-        "knee_forward has a range of 2.02e+03 m/s^2 per stride (plausible: 0.5 to 80 m/s^2)",
+        "knee_forward has a range of 2020 m/s^2 per stride (plausible: 0.5 to 80)",
     ),
     "knee exchanged": (exchanged, "exchange them"),
     "knee in g": (
@@ -176,7 +174,7 @@ def test_a_reversed_shank_without_a_force_is_named_as_what_it_is(
     csv_of: Callable[..., Path], columns: dict[str, Floats]
 ) -> None:
     reversed_shank = changed(SHANK, np.negative)({name: x for name, x in columns.items() if name != FORCE})
-    with pytest.raises(DataError, match=r"on the ground for 18 % of the stride, by shank_angle \(plausible"):
+    with pytest.raises(DataError, match=r"on the ground for 17.8 % of the stride, by shank_angle \(plausible"):
         import_gait([csv_of(reversed_shank)], ImportSettings(62.0))
 
 
@@ -186,13 +184,14 @@ def test_a_force_that_is_not_half_the_weight_is_remarked(
 ) -> None:
     (remark,) = import_gait([csv_of(scaled((FORCE,), factor)(columns))], ImportSettings(62.0)).remarks
     assert remark.startswith(f"vertical_force has a mean of {shown} body weights, but each leg of a steady walk")
-    assert import_gait([csv_of(columns)], ImportSettings(62.0)).remarks == ()
+    # One file need not be a list of one.
+    assert import_gait(str(csv_of(columns)), ImportSettings(62.0)).remarks == ()
 
 
 def test_a_time_in_milliseconds_is_refused(
     csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording
 ) -> None:
-    with pytest.raises(DataError, match=r"the stride time is 1.04e\+03 s \(plausible: 0.5 to 3 s\)"):
+    with pytest.raises(DataError, match=r"the stride time is 1040 s \(plausible: 0.5 to 3\)"):
         import_gait([csv_of(columns, 1000.0 * walk.time)], ImportSettings(62.0))
 
 
@@ -200,11 +199,7 @@ def test_a_time_in_milliseconds_is_refused(
     ("first", "last", "said"),
     [
         (190, 390, "1 heel strike in vertical_force; a stride needs two"),
-        (
-            10,
-            200,
-            "0 heel strikes in vertical_force; a stride needs two",
-        ),
+        (10, 200, "0 heel strikes in vertical_force; a stride needs two"),
     ],
 )
 def test_a_record_of_one_heel_strike_has_the_right_column(

@@ -13,7 +13,7 @@ import numpy as np
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError
 from ppafo.gait.gait import REQUIRED
-from ppafo.gait.plausible import SHANK_RANGE, check_angle_range
+from ppafo.gait.plausible import SHANK_RANGE, range_faults
 from ppafo.gait.recorded.mapping import Side
 from ppafo.gait.recorded.signal import LOADS, CurveColumns, Signal, low_pass, with_absence
 from ppafo.gait.recorded.table import OFF, STRIKE, MotionTable
@@ -322,9 +322,9 @@ def strides_from_shank(shank: Signal) -> list[Stride]:
     with a gyroscope on the shank. Raises DataError if there is no toe-off.
     """
     smooth = low_pass(shank, _SMOOTH)
-    high, low = float(np.max(smooth.values)), float(np.min(smooth.values))
     # A unit that is wrong would be told as a sign that is.
-    check_angle_range(f"{shank.file}: shank_angle", float(np.degrees(high - low)), SHANK_RANGE, is_whole=True)
+    for fault in range_faults(f"{shank.file}: shank_angle", smooth.values, SHANK_RANGE, is_whole=True):
+        raise DataError(fault)
     peaks = _ends_of_swings(smooth)
     rate = np.gradient(smooth.values, smooth.time)
     strides = []
@@ -361,18 +361,14 @@ def heel_strikes(events: str, walk: Mapping[str, Signal]) -> list[float]:
 
 def usable_strides(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> list[Stride]:
     """Return the strides over which both shank and ankle angle were recorded."""
-    return [stride for stride in strides if all(strides_within(walk[name], [stride]) for name in REQUIRED)]
+    return [stride for stride in strides if all(is_within(walk[name], stride) for name in REQUIRED)]
 
 
-def strides_within(signal: Signal, strides: Sequence[Stride]) -> list[Stride]:
-    """Return the strides that lie within a signal, to half a sample, and that contain no lost sample."""
+def is_within(signal: Signal, stride: Stride) -> bool:
+    """Return whether a stride lies within a signal, to half a sample, and contains no lost sample."""
     slack = 0.5 / signal.rate
-    return [
-        stride
-        for stride in strides
-        if stride.start >= signal.time[0] - slack and stride.end <= signal.time[-1] + slack
-        if not lost_in(signal, stride)
-    ]
+    is_inside = stride.start >= signal.time[0] - slack and stride.end <= signal.time[-1] + slack
+    return is_inside and not lost_in(signal, stride)
 
 
 def lost_in(signal: Signal, stride: Stride) -> int:
@@ -382,20 +378,15 @@ def lost_in(signal: Signal, stride: Stride) -> int:
     return int(np.count_nonzero(signal.lost & (signal.time >= stride.start) & (signal.time <= stride.end)))
 
 
-def strides_of_curve(footfalls: Footfalls, name: str, signal: Signal, strides: Sequence[Stride]) -> list[Stride]:
-    """Return the strides that a curve covers: within its record, and for a load with the stance measured."""
-    inside = strides_within(signal, strides)
-    if name not in LOADS or not (footfalls.is_overground or signal.absent is not None):
-        return inside
-    covered = []
-    for stride in inside:
-        slack = _ABOUT_STANCE * stride.time
-        stance = (signal.time >= stride.start + slack) & (signal.time <= stride.toe_off - slack)
-        if not stance.any() or (signal.absent is not None and bool(signal.absent[stance].any())):
-            continue
-        values = signal.values[stance]
-        is_on_plate = values > UNLOADED if name == FORCE else values != 0.0
-        # Overground the foot may have been on the plate for a part of the stance only.
-        if not footfalls.is_overground or float(np.mean(is_on_plate)) >= _COVERED:
-            covered.append(stride)
-    return covered
+def covers(footfalls: Footfalls, name: str, stride: Stride) -> bool:
+    """Return whether a stride lies within the record of a curve, and for a load with the stance measured."""
+    signal = footfalls.walk[name]
+    if not is_within(signal, stride) or name not in LOADS:
+        return is_within(signal, stride)
+    slack = _ABOUT_STANCE * stride.time
+    stance = (signal.time >= stride.start + slack) & (signal.time <= stride.toe_off - slack)
+    if signal.absent is not None and (not stance.any() or bool(signal.absent[stance].any())):
+        return False
+    is_on_plate = signal.values[stance] > UNLOADED if name == FORCE else signal.values[stance] != 0.0
+    # Overground the foot may have been on the plate for a part of the stance only.
+    return not footfalls.is_overground or (is_on_plate.size > 0 and float(np.mean(is_on_plate)) >= _COVERED)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.arguments import checked
 from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.document import load_gait
 from ppafo.gait.gait import HARMONICS, REQUIRED, FitError, Gait, Origin, fit_curve
@@ -29,14 +30,14 @@ from ppafo.gait.recorded.footfalls import (
     SHANK,
     Footfalls,
     Stride,
+    covers,
     find_footfalls,
     heel_strikes,
+    is_within,
     lost_in,
-    strides_of_curve,
-    strides_within,
     usable_strides,
 )
-from ppafo.gait.recorded.mapping import ImportSettings, check_settings, setting_text
+from ppafo.gait.recorded.mapping import ImportSettings, check_settings, setting_text, unsigned_names
 from ppafo.gait.recorded.signal import LOADS, Signal, knee_remarks, low_pass
 from ppafo.gait.recorded.source import GaitSource, read_source
 from ppafo.gait.recorded.table import LONGEST_FILLED, MotionTable
@@ -155,8 +156,9 @@ class ImportedGait:
     remarks: tuple[str, ...] = field(default=())
 
 
+@checked
 def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> ImportedGait:
-    """Return the mean stride of one walk of one person, from recorded files that share a clock.
+    """Return the mean stride of one walk of one person, from a recorded file or several that share a clock.
 
     The files may be of any format of ``source.FORMS``: .mot, .sto, .csv, .txt, .tsv, .emt, .c3d, .trc, .mat.
 
@@ -174,16 +176,13 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
         raise_noted([*wrong, error])
     curves, strides, unmeasured = _curves_over_strides(source, footfalls, wrong)
     # Both coordinates of the knee may be from one marker, whose scale is one.
-    knee, is_one_marker = source.columns.knee, False
-    if knee is not None and knee.thigh is None and len(knee.forward) == len(knee.up) == 1:
-        forward, up = (terms[0].removeprefix("-").rpartition(".")[0] for terms in (knee.forward, knee.up))
-        is_one_marker = forward == up != ""
+    labels = [name.rpartition(".")[0] for name in unsigned_names(source.columns.knee)]
     mean_stride = MeanStride(
         file={name: source.walk[name].file for name in curves},
         curves={name: curve.mean for name, curve in curves.items()},
         stance_share=float(np.mean([stride.stance_share for stride in strides.taken])),
         stride_time=float(np.mean([stride.time for stride in strides.taken])),
-        is_knee_one_marker=is_one_marker,
+        is_knee_one_marker=len(labels) == 2 and labels[0] == labels[1] != "",
     )
     fitted = {name: fit_curve(curve.mean, HARMONICS[name], curve.spread) for name, curve in curves.items()}
     errors = {name: error for name, (_, error) in fitted.items()}
@@ -262,10 +261,10 @@ def _curves_over_strides(
         wrong.append(DataError(_too_few(usable, footfalls)))
     if not kept:
         raise_noted(wrong)
-    covered = {name: strides_of_curve(footfalls, name, signal, usable.taken) for name, signal in recorded.items()}
+    covered = {name: [stride for stride in usable.taken if covers(footfalls, name, stride)] for name in recorded}
     # A load that no plate measured for a whole stance would otherwise be refused as one whose file is too short.
     uncovered = [name for name in LOADS if name in recorded and not covered[name]]
-    unmeasured = [name for name in uncovered if strides_within(recorded[name], usable.taken)]
+    unmeasured = [name for name in uncovered if any(is_within(recorded[name], stride) for stride in usable.taken)]
     walk = {name: signal for name, signal in recorded.items() if name not in unmeasured}
     moving = without_drop_outs(walk, source.tables, covered, usable, wrong)
     # Footfalls come from the unfiltered force, whose edges a low pass would move.
@@ -277,10 +276,10 @@ def _curves_over_strides(
     strides = without_odd_shapes(curves, moving)
     remaining = {}
     for name, curve in curves.items():
-        is_taken = [stride in strides.taken for stride in curve.strides]
-        if any(is_taken):
-            taken = tuple(stride for stride in curve.strides if stride in strides.taken)
-            remaining[name] = replace(curve, curves=curve.curves[is_taken], strides=taken)
+        kept_rows = [row for row, stride in enumerate(curve.strides) if stride in strides.taken]
+        if kept_rows:
+            taken = tuple(curve.strides[row] for row in kept_rows)
+            remaining[name] = replace(curve, curves=curve.curves[kept_rows], strides=taken)
             continue
         file, time = walk[name].file, walk[name].time
         wrong.append(

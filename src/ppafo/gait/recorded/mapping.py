@@ -183,6 +183,11 @@ def column_names(mapped: object) -> tuple[str, ...]:
     return tuple(_UNIT_OF_HEADER.sub("", term) for term in terms)
 
 
+def unsigned_names(mapped: object) -> list[str]:
+    """Return the columns named in the map of one curve, without their signs; none for a curve without a map."""
+    return [] if mapped is None else [column.removeprefix("-") for column in column_names(mapped)]
+
+
 def unsaid_axes(columns: GaitMap) -> list[str]:
     """Return remarks on assumed axes, for markers whose map does not state the forward or the upward axis."""
     axes = []

@@ -4,13 +4,14 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from textwrap import shorten
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted, refused_as
 from ppafo.gait.gait import HARMONICS
-from ppafo.gait.recorded.mapping import KneeMap, setting_text
+from ppafo.gait.recorded.mapping import KneeMap, column_names, setting_text, unsigned_names
 from ppafo.gait.recorded.table import COORDINATES, MotionTable, marker_of
 from ppafo.signals.recording import Floats
 from ppafo.units import parse_quantity, to_si
@@ -117,33 +118,23 @@ class CurveColumns:
             if not self.may_be_absent:
                 with noted_in(wrong):
                     check_recorded(self.table.columns[name], f"{self.table.file}: column {name!r}")
-            with noted_in(wrong):
-                values, chosen = self._column(name, stated, si_units)
-                total += sign * values
+            where, unit = f"{self.table.file}: column {name!r}", stated or self.table.units[name]
+            problem = f" [{unit}]: " if unit else f" has no unit, in the file or as {self.unit_key} of a gait map"
+            for si_unit in (*si_units, _RATE) if unit else ():
+                try:
+                    # Units are affine: two conversions give scale and zero for a whole column.
+                    zero, one = (to_si(number, "" if unit == "-" else unit, si_unit) for number in (0.0, 1.0))
+                except UnitError as error:
+                    problem += str(error) if si_unit == si_units[0] else ""
+                    continue
+                if si_unit == _RATE:
+                    problem += _NOT_INTEGRATED
+                    break
+                total, chosen, problem = total + sign * (zero + (one - zero) * self.table.columns[name]), si_unit, ""
+                break
+            wrong += [DataError(f"{where}{problem}")] if problem else []
         raise_noted(wrong)
         return total, chosen
-
-    def _column(self, name: str, stated: str | None, si_units: Sequence[str]) -> tuple[Floats, str]:
-        """Return a column in the first SI unit that fits, and this unit; raises DataError if none fits."""
-        where = f"{self.table.file}: column {name!r}"
-        unit = stated or self.table.units[name]
-        values = self.table.columns[name]
-        if not unit:
-            raise DataError(f"{where} has no unit, in the file or as {self.unit_key} of a gait map")
-        parsed_unit = "" if unit == "-" else unit
-        problem = ""
-        for si_unit in (*si_units, _RATE):
-            try:
-                # Units are affine: two conversions give scale and zero for a whole column.
-                zero, one = (to_si(number, parsed_unit, si_unit) for number in (0.0, 1.0))
-            except UnitError as error:
-                problem = problem or str(error)
-                continue
-            if si_unit == _RATE:
-                problem += _NOT_INTEGRATED
-                break
-            return zero + (one - zero) * values, si_unit
-        raise DataError(f"{where} [{unit}]: {problem}")
 
 
 def check_recorded(values: Floats, where: str) -> None:
@@ -152,30 +143,27 @@ def check_recorded(values: Floats, where: str) -> None:
         raise DataError(f"{where} contains no numbers")
 
 
-def find_columns(
-    curve: str, names: Sequence[str], tables: Sequence[MotionTable], optional: bool
-) -> CurveColumns | None:
+def find_columns(curve: str, mapped: object, tables: Sequence[MotionTable], optional: bool) -> CurveColumns | None:
     """Return the columns of a curve from the one table that has all of them; None for an optional curve without any."""
-    unsigned = [name.removeprefix("-") for name in names]
+    unsigned = unsigned_names(mapped)
     # One table must have all terms: files need not share a clock to the sample.
-    holders = [table for table in tables if all(name in table.columns for name in unsigned)]
+    holders = [table for table in tables if unsigned and table.columns.keys() >= set(unsigned)]
     if len(holders) > 1:
         files = " and ".join(table.file for table in holders)
         raise DataError(f"{curve}: {files} both have the column {unsigned[0]!r}")
     if holders:
-        signs = [-1.0 if name.startswith("-") else 1.0 for name in names]
-        terms = tuple(zip(signs, unsigned, strict=True))
-        return CurveColumns(f"{curve}.unit", holders[0], terms, curve in LOADS)
-    if optional and not any(name in table.columns for name in unsigned for table in tables):
-        return None
-    raise DataError(missing_column({curve: unsigned}, tables))
+        signs = [-1.0 if name.startswith("-") else 1.0 for name in column_names(mapped)]
+        return CurveColumns(f"{curve}.unit", holders[0], tuple(zip(signs, unsigned, strict=True)), curve in LOADS)
+    if not (optional and not any(name in table.columns for name in unsigned for table in tables)):
+        refuse_missing({curve: unsigned}, tables)
+    return None
 
 
-def missing_column(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTable]) -> str:
-    """Return a message on the missing columns of curves; ``names`` are the unsigned columns of each curve.
+def refuse_missing(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTable]) -> NoReturn:
+    """Raise DataError for missing columns of curves; ``names`` are the unsigned columns of each curve.
 
-    The message has the nearest name for each missing column, and the columns and remarks of the files, shortened.
-    Raises DataError for a column name that a file has more than once.
+    The message has the nearest name for each missing column, and the columns and remarks of the files, shortened. A
+    column name that a file has more than once is another fault.
     """
     known, reasons = [name for table in tables for name in table.columns], []
     files = ", ".join(table.file for table in tables)
@@ -195,23 +183,23 @@ def missing_column(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTa
     first_names = ", ".join(markers[:_MOST_NAMES]) + (", ..." if len(markers) > _MOST_NAMES else "")
     texts = [first_names, *(one_line(remark) for table in tables for remark in table.remarks)]
     listed = "; ".join(shorten(text, _LONGEST_TEXT, placeholder=" ...") for text in texts)
-    return f"{'; '.join(reasons)} ({files}: {listed}); a gait map ({setting_text('columns')}) names other columns"
+    message = f"{'; '.join(reasons)} ({files}: {listed}); a gait map ({setting_text('columns')}) names other columns"
+    raise DataError(message)
 
 
 def knee_signals(
-    mapped: KneeMap, tables: Sequence[MotionTable], stature: float | None, is_default: bool
+    mapped: KneeMap | None, tables: Sequence[MotionTable], stature: float | None, is_default: bool
 ) -> dict[str, Signal]:
     """Return ``knee_forward`` and ``knee_up``, each a position [m] or an acceleration [m/s^2].
 
     With a thigh, they are the position of the knee, computed in the sagittal plane from the hip position in the columns
     of the map and the lean of the thigh. Raises DataError if a column, unit or length is missing or inconsistent.
     """
-    if mapped.thigh is not None and mapped.thigh_length is None and stature is None:
-        if is_default:
-            return {}
+    if mapped is None or (is_default and mapped.thigh and mapped.thigh_length is None and stature is None):
+        return {}
+    if mapped.thigh and mapped.thigh_length is None and stature is None:
         raise DataError("knee.thigh needs knee.thigh_length, or the stature")
-    thigh = mapped.thigh or ()
-    found = find_columns("knee", (*mapped.forward, *mapped.up, *thigh), tables, is_default)
+    found = find_columns("knee", mapped, tables, is_default)
     if found is None:
         return {}
     ends = len(mapped.forward), len(mapped.forward) + len(mapped.up)

@@ -5,7 +5,6 @@ and ankle angle of the foot relative to the shank), or, for the knee, from hip a
 """
 
 import math
-import re
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,7 +14,7 @@ import numpy as np
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.gait import REQUIRED
-from ppafo.gait.plausible import SHANK_RANGE, MeanStride, check_ankle_alone, check_force_scale, check_moment
+from ppafo.gait.plausible import SHANK_RANGE, MeanStride, ankle_faults_alone, check_force_scale, moment_faults
 from ppafo.gait.recorded.footfalls import FORCE, force_of_plates
 from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.forms.markers import convention_of_map
@@ -29,8 +28,8 @@ from ppafo.gait.recorded.mapping import (
     PressureMap,
     ShankMap,
     Side,
-    column_names,
     setting_text,
+    unsigned_names,
 )
 from ppafo.gait.recorded.signal import (
     LOADS,
@@ -39,7 +38,7 @@ from ppafo.gait.recorded.signal import (
     check_recorded,
     find_columns,
     knee_signals,
-    missing_column,
+    refuse_missing,
     with_absence,
     without_ends,
 )
@@ -48,6 +47,7 @@ from ppafo.gait.recorded.table import (
     counted_table,
     cut_table,
     fill_gaps,
+    marker_of,
     mean_stride_table,
     without_lost_markers,
 )
@@ -56,9 +56,6 @@ from ppafo.plugins import nearest_kind
 from ppafo.signals.recording import Floats
 from ppafo.units import format_quantity
 from ppafo.wording import one_line
-
-_COORDINATE = re.compile(r"\.[xyz]$")
-"""Suffix of a coordinate of a marker or load."""
 
 # The forms of gait recordings, tables of files in any of them, and the one map of files that come without one.
 
@@ -124,22 +121,17 @@ def walk_signals(
     starts at its first valid sample and ends at its last; a load is 0 where it was not measured.
     Raises DataError if no file has an angle, with all problems in ``wrong``.
     """
-    try:
-        angles = {
-            name: [column.removeprefix("-") for column in column_names(getattr(columns, name))] for name in REQUIRED
-        }
-        if not any(table.columns.keys() >= set(names) for table in tables for names in angles.values()):
-            raise DataError(missing_column(angles, tables))
-    except DataError as error:
-        raise_noted([*wrong, error])
+    angles = {name: unsigned_names(getattr(columns, name)) for name in REQUIRED}
+    if not any(table.columns.keys() >= set(names) for table in tables for names in angles.values()):
+        with noted_in(wrong):
+            refuse_missing(angles, tables)
+        raise_noted(wrong)
     walk: dict[str, Signal] = {}
     # The shank stands first: an ankle from markers of the foot turns against it.
     for name in _UNITS:
         mapped, found = getattr(columns, name), None
-        if mapped is None:
-            continue
         with noted_in(wrong):
-            found = find_columns(name, column_names(mapped), tables, name not in {*required, *REQUIRED})
+            found = find_columns(name, mapped, tables, name not in {*required, *REQUIRED})
             if found is None:
                 continue
             if not isinstance(mapped, AngleMap) or mapped.terms is not None:
@@ -154,7 +146,7 @@ def walk_signals(
             # In a recording that is no walk, other faults do not matter.
             check_walks(walk[name], found, mapped)
     with noted_in(wrong):
-        knee = {} if columns.knee is None else knee_signals(columns.knee, tables, stature, "knee" not in required)
+        knee = knee_signals(columns.knee, tables, stature, "knee" not in required)
         walk |= {name: without_ends(signal) for name, signal in knee.items()}
     return walk
 
@@ -293,12 +285,6 @@ def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float)
     return Convention(GaitMap(**columns), () if has_force else plates, remarks, curve_remarks)
 
 
-def _named_in(own: GaitMap | None) -> dict[str, list[str]]:
-    """Return the columns that a user's map names, by curve in the order of the map, without their signs."""
-    named = {} if own is None else {name: column_names(getattr(own, name)) for name in own.named}
-    return {name: [column.removeprefix("-") for column in columns] for name, columns in named.items()}
-
-
 def _completed_map(own: GaitMap | None, tables: Sequence[MotionTable], side: Side, body_mass: float) -> Convention:
     """Return a user's map, if any, with the curves that it leaves out as the file formats have them.
 
@@ -306,10 +292,10 @@ def _completed_map(own: GaitMap | None, tables: Sequence[MotionTable], side: Sid
     """
     if own is None:
         return find_convention(tables, side, body_mass)
-    named, problems = _named_in(own), []
+    named, problems = {name: unsigned_names(getattr(own, name)) for name in own.named}, []
     # The format shall not judge the units of loads whose columns the map names.
-    loads = {_COORDINATE.sub("", column) for name in LOADS for column in named.get(name, ())}
-    kept = [[name for name in table.columns if _COORDINATE.sub("", name) not in loads] for table in tables]
+    loads = {marker_of(column) for name in LOADS for column in named.get(name, ())}
+    kept = [[name for name in table.columns if marker_of(name) not in loads] for table in tables]
     pairs = zip(tables, kept, strict=True)
     others = [replace(table, columns={name: table.columns[name] for name in names}) for table, names in pairs]
     try:
@@ -327,8 +313,7 @@ def _completed_map(own: GaitMap | None, tables: Sequence[MotionTable], side: Sid
 
 
 def _is_there(mapped: object, table: MotionTable) -> bool:
-    """Return True if a table has all columns of a mapped curve."""
-    return mapped is not None and all(name.removeprefix("-") in table.columns for name in column_names(mapped))
+    return mapped is not None and table.columns.keys() >= set(unsigned_names(mapped))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -351,8 +336,11 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
 
     Raises DataError for a problem that ends the import, including all problems in ``wrong``.
     """
-    own, named = settings.columns, _named_in(settings.columns)
-    tables = _read_tables(files, settings, {column for columns in named.values() for column in columns}, wrong)
+    own = settings.columns
+    named = () if own is None else own.named
+    tables = _read_tables(
+        files, settings, {each for name in named for each in unsigned_names(getattr(own, name))}, wrong
+    )
     # The columns of unusable tables are still checked, before the import ends.
     is_usable = not wrong
     settings, remarks = _with_subject(settings, tables, wrong)
@@ -366,21 +354,19 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
         neutral = format_quantity(settings.ankle_neutral, "rad")
         columns = replace(columns, ankle_angle=replace(columns.ankle_angle, neutral=neutral))
     # Gaps matter in the columns in use only. A load of exactly 0 is no lost marker but a foot off the plate.
-    used = _named_in(columns)
+    used = {name: unsigned_names(getattr(columns, name)) for name in CURVES}
     names = [column for terms in used.values() for column in terms]
     moved = [column for name, terms in used.items() if name not in LOADS for column in terms]
     tables = [fill_gaps(without_lost_markers(table, moved), names, settings.longest_gap) for table in tables]
-    walk = walk_signals(tables, columns, body_mass, settings.stature, named.keys(), wrong)
+    walk = walk_signals(tables, columns, body_mass, settings.stature, set(named), wrong)
     if any(name not in walk for name in REQUIRED):
         # Without a stride, the whole recording still shows the range of the ankle and the sign of its moment.
         curves = {name: signal.values[np.isfinite(signal.values)] for name, signal in walk.items()}
         whole = MeanStride({name: signal.file for name, signal in walk.items()}, curves, 0.0, 0.0)
-        for check in (check_ankle_alone, check_moment) if settings.body_mass else (check_ankle_alone,):
-            with noted_in(wrong):
-                check(whole)
-        raise_noted(wrong)
+        faults = [*ankle_faults_alone(whole), *(moment_faults(whole) if settings.body_mass else ())]
+        raise_noted([*wrong, *map(DataError, faults)])
     # The knee is one entry of a map, but two curves.
-    added = {name: each.columns for name, each in walk.items() if not {name, name.partition("_")[0]} & named.keys()}
+    added = {name: each.columns for name, each in walk.items() if not {name, name.partition("_")[0]} & {*named}}
     if own is not None and added:
         shown = "; ".join(f"{name} from {', '.join(map(repr, names))}" for name, names in added.items())
         remarks.append(f"not in the gait map, read as the {settings.side} foot by the file format: {shown}")

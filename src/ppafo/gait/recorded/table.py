@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.errors import DataError, refused_as
 from ppafo.signals.recording import Floats
@@ -157,7 +156,7 @@ def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTabl
     ``_COARSE`` or more, a marker at rest does so too: then only a jump after it, further than a marker can move from
     rest in one sample interval, ``MOST_ACCELERATION`` times the interval squared [m], shows that it was lost.
     """
-    columns, remarks = dict(table.columns), []
+    columns, remarks = dict(table.columns), list[str]()
     labels = dict.fromkeys(name[:-2] for name in names if name[-2:] in COORDINATES)
     interval = float(np.median(np.diff(table.time))) if table.time.size > 1 else 0.0
     for label in labels:
@@ -168,11 +167,20 @@ def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTabl
         recorded, zero = np.isfinite(at).all(axis=0), (at == 0.0).all(axis=0)
         steps = np.abs(np.diff(at, axis=1))
         is_coarse = steps.any() and float(np.min(steps, initial=np.inf, where=steps > 0.0)) > _COARSE
+        # A marker that is repeated up to the end of the file never jumps; one that never moves is a point of the lab.
+        furthest = MOST_ACCELERATION * interval**2 if is_coarse else 0.0
+        lengths = np.linalg.norm(np.diff(at, axis=1), axis=0)
+        moves = np.flatnonzero(lengths != 0.0).tolist()
+        held = np.zeros(lengths.size + 1, dtype=np.bool_)
+        for before, after in pairwise([*moves, *([lengths.size] if moves and furthest == 0.0 else [])]):
+            # Frames before + 1 to after have one place, of which the first was seen.
+            if after - before > 2 and (after == lengths.size or lengths[after] > furthest):
+                held[before + 2 : after + 1] = True
         causes = {
             "not recorded": ~recorded,
             # A marker that is 0 throughout stands at the origin.
             "all coordinates 0": zero & bool((recorded & ~zero).any()),
-            "position unchanged": ~zero & _held(at, MOST_ACCELERATION * interval**2 if is_coarse else 0.0),
+            "position unchanged": ~zero & held,
         }
         lost = {cause: frames for cause, frames in causes.items() if frames.any()}
         if not lost:
@@ -183,23 +191,6 @@ def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTabl
         how = " and ".join(lost)
         remarks.append(f"marker '{label}' was lost in {np.count_nonzero(gap)} of {table.time.size} frames ({how})")
     return replace(table, columns=columns, remarks=(*table.remarks, *remarks))
-
-
-def _held(at: Floats, furthest: float) -> NDArray[np.bool_]:
-    """Return the frames in which a marker (coordinates, frames) [m] repeats its position before a jump.
-
-    A marker that is repeated up to the end of the file never jumps: only a ``furthest`` of 0 finds it.
-    """
-    steps = np.linalg.norm(np.diff(at, axis=1), axis=0)
-    held = np.zeros(at.shape[1], dtype=np.bool_)
-    moves = np.flatnonzero(steps != 0.0).tolist()
-    # A marker that never moves is a point of the laboratory.
-    last = [steps.size] if moves and furthest == 0.0 else []
-    for before, after in pairwise([*moves, *last]):
-        # Frames before + 1 to after have one place, of which the first was seen.
-        if after - before > 2 and (after == steps.size or steps[after] > furthest):
-            held[before + 2 : after + 1] = True
-    return held
 
 
 def fill_gaps(table: MotionTable, names: Iterable[str], longest: float) -> MotionTable:

@@ -71,7 +71,12 @@ def read_opensim(path: str | Path) -> MotionTable:
             raise DataError(f"line {at + 1}: the first column must be '{TIME}', not {first!r}")
         if "" in labels:
             raise DataError(f"line {at + 1}: column {labels.index('') + 1} has no name")
-        rows, remarks = _rows(lines, at + 1, len(labels)), list[str]()
+        rows, remarks = "\n".join(lines[at + 1 :]).rstrip().split("\n"), list[str]()
+        if rows == [""]:
+            raise DataError("has labels but no rows")
+        empty = next((number for number, row in enumerate(rows, at + 2) if not row.strip()), None)
+        if empty is not None:
+            raise DataError(f"line {empty} has 0 values for {len(labels)} columns")
         stated = counts.get("nrows", counts.get("datarows", len(rows)))
         if stated != len(rows):
             raise DataError(f"has {len(rows)} rows, but the header states {stated}: the file is cut off or was edited")
@@ -96,19 +101,6 @@ def read_opensim(path: str | Path) -> MotionTable:
     if is_unstated and "deg" in units.values():
         remarks.append("the header states no unit of angles; degrees assumed, as in older OpenSim files")
     return replace(table, columns=columns, units=units, remarks=tuple(remarks))
-
-
-def _rows(lines: Sequence[str], first: int, width: int) -> list[str]:
-    """Return the rows from an index on; only blank lines may follow the last."""
-    last = len(lines)
-    while last > first and not lines[last - 1].strip():
-        last -= 1
-    if last == first:
-        raise DataError("has labels but no rows")
-    for number, line in enumerate(lines[first:last], first + 1):
-        if not line.strip():
-            raise DataError(f"line {number} has 0 values for {width} columns")
-    return [*lines[first:last]]
 
 
 def _time_of(row: str) -> float | str:
