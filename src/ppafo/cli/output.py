@@ -104,7 +104,7 @@ def deliver(answer: Any, as_json: bool, out: Path | None, command: str, *, has_w
         # Files that other commands take, such as the gait of 'ppafo walk --gait'.
         label = "file to use" if answer.passed else "file, not passed"
         usable_files = [f"{label}: {out / name}" for name in answer.files if name.endswith(".toml")]
-        from ppafo.walking.bottle.course import WALKED
+        from ppafo.walking.bottle.coupling import WALKED
 
         # A walk that ended before its bottle did.
         if document.get("supply", {}).get("ending", {}).get("kind") == WALKED:

@@ -8,10 +8,12 @@ import numpy as np
 
 from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.run import Run
-from ppafo.metrics import METRICS, evaluate
+from ppafo.metrics import METRICS, Metric, evaluate
+from ppafo.metrics.command import command_reversals, peak_torque, requested_samples
 from ppafo.metrics.metric import MetricKind, Metrics
-from ppafo.metrics.strides import SETTLING
+from ppafo.metrics.strides import PER_STRIDE, SETTLING
 from ppafo.model.contact import SWING
+from ppafo.model.helping import PUSH_OFF
 from ppafo.model.leg import LegParameters, passive_torque, torque_on_knee
 from ppafo.signals import Recording
 from ppafo.signals.meter import LED_SHANK, REQUESTED
@@ -21,27 +23,15 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status, end_of, rows_by_path
 from ppafo.simulation.vane_recording import device_channels, recording_of
 from ppafo.units.shown import in_units
-from ppafo.walking.bottle.course import UNITS, SupplyCourse
+from ppafo.walking.bottle.coupling import UNITS, SupplyCourse
 from ppafo.walking.gait_series import ankle_path
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of, requests_torque
 from ppafo.walking.result import WalkResult
-from ppafo.walking.strides import mean_curves, per_stride, stride_starts, walk_metrics
+from ppafo.walking.strides import healthy_positive_work, lowest_toes, mean_curves, per_stride, stride_starts
 
 _PHASE_ROW, _REQUEST_ROW = "controller_state.phase.phase", "controller_state.request.torque"
 """Paths of the rows for gait phase and requested torque of a controller that has them."""
-
-
-def dorsiflexor_moment(leg: LegParameters, record: Mapping[str, Any]) -> Floats:
-    """Return the dorsiflexor moment [N m], at least 0, with which the wearer follows the measured ankle angle.
-
-    The moment is the ankle moment of the gait (measured in stance, from equation (11) in swing) minus the moment of
-    passive tissue and T_ex. The literature reports the activity of the tibialis anterior instead.
-    """
-    in_swing = record["walk.contact"] == SWING
-    needed = np.where(in_swing, record["walk.now.healthy_torque"], record["walk.now.moment"])
-    tissue = passive_torque(leg, record["walk.now.ankle"])
-    return np.asarray(np.maximum(tissue + record["walk.external_torque"] - needed, 0.0))
 
 
 def swing_knee_torque(leg: LegParameters, time: Floats, record: Mapping[str, Any]) -> Floats:
@@ -95,12 +85,19 @@ def recording_of_walk(
         "toe_force": (record["walk.toe_force"], "N"),
     }
     if walk.leg.keeps_gait >= 0.5:
-        channels["dorsiflexor_moment"] = (dorsiflexor_moment(walk.leg, record), "N m")
+        # With this moment, at least 0, the wearer follows the measured ankle angle: the ankle moment of the gait (from
+        # equation (11) in swing) minus the moment of passive tissue and T_ex. The literature reports the activity of
+        # the tibialis anterior instead.
+        is_swing = record["walk.contact"] == SWING
+        needed = np.where(is_swing, record["walk.now.healthy_torque"], record["walk.now.moment"])
+        of_tissue: Any = passive_torque  # plain arithmetic, of arrays too
+        tissue = of_tissue(walk.leg, record["walk.now.ankle"])
+        channels["dorsiflexor_moment"] = (np.maximum(tissue + external - needed, 0.0), "N m")
     if supply is not None:
         # Interpolated linearly between the exchanges of bottle and device.
         for name, values in supply.values.items():
             channels[name] = (np.interp(time, supply.times, values), UNITS[name])
-        channels["bottle_mass"] = (supply.first.mass - record["line_state.regulated_mass"], "kg")
+        channels["bottle_mass"] = (supply.met[0].state.mass - record["line_state.regulated_mass"], "kg")
     if _PHASE_ROW in record:
         channels["controller_phase"] = (record[_PHASE_ROW], "-")
     if _REQUEST_ROW in record:
@@ -127,12 +124,56 @@ def _evaluated(
     status: Status,
     supply: SupplyCourse | None,
 ) -> WalkResult:
-    """Return the result of a walk from its rows (samples,) by path at times [s], up to the time of a failure."""
+    """Return the result of a walk from its rows (samples,) by path at times [s], up to the time of a failure.
+
+    Means leave out the first strides, in which the controller adapts.
+    """
     recording = recording_of_walk(scenario, run, time, record, supply)
     starts = stride_starts(record["walk.strides"])
     strides = per_stride(record, starts)
     averages = mean_curves(recording, starts[SETTLING:])
-    metrics = walk_metrics(scenario, recording, strides, averages, starts)
+    metrics: dict[str, Metric] = {}
+    for name, quantity in PER_STRIDE.items():
+        values = strides[name][SETTLING:]
+        if values.size:
+            metrics[name] = Metric(float(values.mean()), quantity.unit, f"{quantity.summary}, mean")
+    metrics["counted_strides"] = Metric(
+        float(strides["gas"][SETTLING:].size), "-", "strides over which the means are taken"
+    )
+    healthy = healthy_positive_work(scenario)
+    if healthy > 0.0:
+        metrics["healthy_positive_work"] = Metric(healthy, "J", "positive work of the healthy ankle in one stride")
+        if "positive_push_off_work" in metrics:
+            fraction = metrics["positive_push_off_work"].value / healthy
+            summary = "positive work of T_ex in push-off over the healthy ankle's positive work"
+            metrics["push_off_share"] = Metric(fraction, "-", summary)
+    if "dorsiflexor_moment" in averages:
+        # Phase 1 is phase 0 of the next stride, and counts once.
+        moment = float(averages["dorsiflexor_moment"].mean[:-1].mean())
+        summary = "moment of the wearer's dorsiflexors, mean over the stride"
+        metrics["dorsiflexor_moment"] = Metric(moment, "N m", summary)
+    if "toe_height" in averages:
+        metrics["lowest_toes"] = lowest_toes(scenario, averages["toe_height"].mean)
+    if "angle" in averages:
+        # Of the mean curves: what differs from stride to stride is in their deviation.
+        away = averages["angle"].mean - averages["healthy_angle"].mean
+        summary = "RMS difference of the mean ankle angle to the healthy one"
+        metrics["angle_difference"] = Metric(float(np.sqrt(np.mean(away**2))), "rad", summary)
+    gas = float(np.ptp(recording["supplied_mass"][[0, -1]]))
+    metrics["strides"] = Metric(float(strides["gas"].size), "-", "whole strides of the walk")
+    metrics["total_gas"] = Metric(gas, "kg", "gas taken from the supply in the whole walk")
+    of_torque: dict[str, float] = {}
+    if "reference" in recording:
+        reference, requested = recording["reference"], requested_samples(recording)
+        error = reference - recording["torque"]
+        # A controller that requests a torque is judged by how well it gets it in push-off.
+        settled = slice(*starts[[SETTLING, -1]]) if starts.size > SETTLING else slice(0)
+        pushes = recording["controller_phase"][settled] == PUSH_OFF
+        parts = {"push_off_error": error[settled][pushes], "torque_error": error[requested]}
+        parts["requested_torque"] = reference[requested]
+        of_torque = {name: float(np.sqrt(np.mean(part**2))) for name, part in parts.items() if part.size}
+    of_torque |= {"peak_torque": peak_torque(recording), "command_reversals": command_reversals(recording)}
+    metrics |= {name: Metric(value, METRICS[name].unit, METRICS[name].summary) for name, value in of_torque.items()}
     METRICS.load_all()
     others = [kind for name, kind in METRICS.items() if not METRICS.is_own(name) and not lacks(scenario, kind)]
     metrics |= evaluate(recording, others)

@@ -24,7 +24,7 @@ from ppafo.simulation.tracking import Tracking, tracking_in
 from ppafo.simulation.tracking.remedies import level_text
 from ppafo.simulation.tracking.verdict import TOO_SHORT
 from ppafo.storage.opensim import opensim_recording, write_opensim
-from ppafo.walking.bottle.course import SupplyCourse
+from ppafo.walking.bottle.coupling import SupplyCourse
 from ppafo.walking.motion import walk_of
 from ppafo.walking.strides import Curves
 from ppafo.wording import changed_text, override_text

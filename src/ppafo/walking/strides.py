@@ -1,4 +1,4 @@
-"""Stride-by-stride evaluation of a walk: numbers of each stride, mean curves and metrics."""
+"""Stride-by-stride evaluation of a walk: numbers of each stride, mean curves, and the healthy gait beside them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,10 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.metrics import METRICS, Metric
-from ppafo.metrics.command import command_reversals, peak_torque, requested_samples
-from ppafo.metrics.strides import PER_STRIDE, SETTLING
-from ppafo.model.helping import PUSH_OFF
+from ppafo.metrics import Metric
+from ppafo.metrics.strides import PER_STRIDE
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import Scenario
@@ -57,63 +55,6 @@ def mean_curves(recording: Recording, starts: NDArray[np.intp]) -> dict[str, Cur
             strides = np.interp(times, recording.time, recording[name])
             curves[name] = Curves(strides.mean(axis=0), strides.std(axis=0), recording.unit(name))
     return curves
-
-
-def walk_metrics(
-    configuration: Scenario,
-    recording: Recording,
-    strides: Mapping[str, Floats],
-    averages: Mapping[str, Curves],
-    starts: NDArray[np.intp],
-) -> dict[str, Metric]:
-    """Return the metrics of a walk by name, in SI units.
-
-    ``starts`` are the samples after each heel strike. Means leave out the first strides, in which the controller
-    adapts, as ``averages`` do.
-    """
-    metrics: dict[str, Metric] = {}
-    for name, quantity in PER_STRIDE.items():
-        values = strides[name][SETTLING:]
-        if values.size:
-            metrics[name] = Metric(float(values.mean()), quantity.unit, f"{quantity.summary}, mean")
-    metrics["counted_strides"] = Metric(
-        float(strides["gas"][SETTLING:].size), "-", "strides over which the means are taken"
-    )
-    healthy = healthy_positive_work(configuration)
-    if healthy > 0.0:
-        metrics["healthy_positive_work"] = Metric(healthy, "J", "positive work of the healthy ankle in one stride")
-        if "positive_push_off_work" in metrics:
-            fraction = metrics["positive_push_off_work"].value / healthy
-            summary = "positive work of T_ex in push-off over the healthy ankle's positive work"
-            metrics["push_off_share"] = Metric(fraction, "-", summary)
-    if "dorsiflexor_moment" in averages:
-        # Phase 1 is phase 0 of the next stride, and counts once.
-        moment = float(averages["dorsiflexor_moment"].mean[:-1].mean())
-        summary = "moment of the wearer's dorsiflexors, mean over the stride"
-        metrics["dorsiflexor_moment"] = Metric(moment, "N m", summary)
-    if "toe_height" in averages:
-        metrics["lowest_toes"] = lowest_toes(configuration, averages["toe_height"].mean)
-    if "angle" in averages:
-        # Of the mean curves: what differs from stride to stride is in their deviation.
-        away = averages["angle"].mean - averages["healthy_angle"].mean
-        summary = "RMS difference of the mean ankle angle to the healthy one"
-        metrics["angle_difference"] = Metric(float(np.sqrt(np.mean(away**2))), "rad", summary)
-    gas = float(np.ptp(recording["supplied_mass"][[0, -1]]))
-    metrics["strides"] = Metric(float(strides["gas"].size), "-", "whole strides of the walk")
-    metrics["total_gas"] = Metric(gas, "kg", "gas taken from the supply in the whole walk")
-    of_torque: dict[str, float] = {}
-    if "reference" in recording:
-        reference, requested = recording["reference"], requested_samples(recording)
-        error = reference - recording["torque"]
-        # A controller that requests a torque is judged by how well it gets it in push-off.
-        settled = slice(*starts[[SETTLING, -1]]) if starts.size > SETTLING else slice(0)
-        pushes = recording["controller_phase"][settled] == PUSH_OFF
-        parts = {"push_off_error": error[settled][pushes], "torque_error": error[requested]}
-        parts["requested_torque"] = reference[requested]
-        of_torque = {name: float(np.sqrt(np.mean(part**2))) for name, part in parts.items() if part.size}
-    of_torque |= {"peak_torque": peak_torque(recording), "command_reversals": command_reversals(recording)}
-    metrics |= {name: Metric(value, METRICS[name].unit, METRICS[name].summary) for name, value in of_torque.items()}
-    return metrics
 
 
 def lowest_toes(configuration: Scenario, height: Floats) -> Metric:

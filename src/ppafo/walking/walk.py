@@ -18,14 +18,12 @@ from ppafo.model.leg import passive_torque
 from ppafo.parameters.device import Actuator, FootPlate, Friction
 from ppafo.parameters.graph import outside
 from ppafo.plugins import Plugins
-from ppafo.simulation.clock import MAXIMUM_STEPS
 from ppafo.simulation.contradictions import check_no_bottle
 from ppafo.simulation.numbers import check_parts
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.python_controller import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
-from ppafo.walking.bottle.coupling import Schedule, walk_on_bottle
-from ppafo.walking.bottle.course import WALKED, SupplyCourse
+from ppafo.walking.bottle.coupling import WALKED, walk_on_bottle
 from ppafo.walking.evaluation import result_of_walk
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import SHORTEST_STRIDES, duration_problems, walk_of, with_duration
@@ -92,7 +90,11 @@ def walk(
         raise ScenarioError("a loaded Scenario accepts no overrides, gait or bottle; give these to load_walk")
     else:
         check_parts(scenario)
-    scenario = lasting(scenario, minutes)
+    if minutes is not None:
+        for is_bad, line in duration_problems(scenario, 60.0 * minutes):
+            if is_bad:
+                raise ScenarioError(line(0))
+        scenario = with_duration(scenario, 60.0 * minutes)
     run, motion, custom = plan_run(scenario), walk_of(scenario), scenario.controller.custom
     if custom is not None:
         check_no_bottle(scenario)
@@ -107,37 +109,6 @@ def walk(
         return result_of_walk(scenario, run, block.result(), None)
     rows, supply = walk_on_bottle(run, fed_device(scenario), motion.bottle, motion.gait.stride_time, progress)
     return result_of_walk(scenario, run, rows, supply)
-
-
-def bottle_life(scenario: Scenario, schedule: Schedule) -> SupplyCourse:
-    """Walk on the scenario's bottle until the bottle is exhausted; return the supply over time.
-
-    The simulation is as in ``walk``, with the rests and the longest duration of ``schedule``. Raises ScenarioError for
-    a walk without a bottle.
-    """
-    motion = walk_of(scenario)
-    if motion.bottle is None:
-        raise ScenarioError(f"{scenario.name}: has no bottle; give a walk with [bottle]")
-    if scenario.controller.custom is not None:
-        check_no_bottle(scenario)
-    # Recorded once a minute, for up to the longest duration: whole minutes, as many as the steps of one run allow.
-    stride_time = motion.gait.stride_time
-    minute = replace(scenario, run=replace(scenario.run, duration=60.0, output_interval=60.0))
-    seconds_of_run = 60.0 * (MAXIMUM_STEPS * plan_run(minute).step // 60.0)
-    seconds = min(math.ceil(schedule.longest / stride_time) * stride_time, seconds_of_run)
-    repeated = replace(minute, run=replace(minute.run, duration=60.0 * max(1, round(seconds / 60.0))))
-    run, device = plan_run(repeated), fed_device(repeated)
-    return walk_on_bottle(run, device, motion.bottle, stride_time, silent, schedule)[1]
-
-
-def lasting(scenario: Scenario, minutes: float | None) -> Scenario:
-    """Return the walk with a duration [min], its own by default; raises ScenarioError if too short or too long."""
-    if minutes is None:
-        return scenario
-    for is_bad, line in duration_problems(scenario, 60.0 * minutes):
-        if is_bad:
-            raise ScenarioError(line(0))
-    return with_duration(scenario, 60.0 * minutes)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

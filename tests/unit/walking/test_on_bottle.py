@@ -27,9 +27,9 @@ def small() -> WalkResult:
 def test_mass_and_energy_close(small: WalkResult) -> None:
     assert small.supply is not None
     balance = small.supply.balance
-    assert balance.left_bottle == pytest.approx(balance.regulated, rel=1e-12)
-    assert balance.regulated > 4.0e-3
-    assert balance.given_up + balance.ice + balance.room == pytest.approx(balance.delivered, rel=1e-12)
+    assert balance["left_bottle"] == pytest.approx(balance["regulated"], rel=1e-12)
+    assert balance["regulated"] > 4.0e-3
+    assert balance["given_up"] + balance["ice"] + balance["room"] == pytest.approx(balance["delivered"], rel=1e-12)
 
 
 def test_the_band_of_the_line_is_seen_beside_the_pressure_of_the_regulator(small: WalkResult) -> None:
@@ -125,9 +125,9 @@ def test_ice_narrows_the_seat_until_the_gas_lacks_no_more_than_it_is_given() -> 
     assert opened[0] == 1.0
     assert opened.min() < 0.05
     balance = found.supply.balance
-    assert balance.iced > 4.0e-5
-    assert balance.left_bottle == pytest.approx(balance.regulated + balance.iced, rel=1e-12)
-    assert balance.given_up + balance.ice + balance.room == pytest.approx(balance.delivered, rel=1e-12)
+    assert balance["iced"] > 4.0e-5
+    assert balance["left_bottle"] == pytest.approx(balance["regulated"] + balance["iced"], rel=1e-12)
+    assert balance["given_up"] + balance["ice"] + balance["room"] == pytest.approx(balance["delivered"], rel=1e-12)
     assert np.diff(found.recording["regulated_mass"])[-500:].sum() < 0.1 * found.recording["regulated_mass"][-1]
 
 
@@ -168,7 +168,7 @@ def test_a_bottle_that_ends_a_walk_within_the_first_strides_is_named_with_its_ti
 ) -> None:
     assert small.supply is not None
     ending = small.supply.ending._replace(kind="empty", time=3.1, message="the bottle is empty")
-    ended = replace(small, supply=replace(small.supply, ending=ending))
+    ended = replace(small, supply=replace(small.supply, ended=ending))
     monkeypatch.setitem(unwrap(compare_walks).__globals__, "walk", lambda *_, **__: ended)
     with pytest.raises(SimulationError, match=r"ends after 3\.1 s, within the first 5 strides \(the bottle is empty\)"):
         compare_walks(small.scenario)

@@ -35,7 +35,9 @@ from ppafo.report.stored_figure import stated_units, table_at
 from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
+from ppafo.simulation.clock import MAXIMUM_STEPS
 from ppafo.simulation.loading import request_again, scenario_of
+from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Origin, Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.owned_folder import read_json
@@ -45,13 +47,13 @@ from ppafo.units import format_quantity
 from ppafo.units.shown import in_units, shown_in, shown_text, units_beside, written_text
 from ppafo.version import __version__
 from ppafo.walking import WalkResult
-from ppafo.walking.bottle.coupling import Schedule
-from ppafo.walking.bottle.course import WALKED, duration_text, strides_text
+from ppafo.walking.bottle.coupling import WALKED, Schedule, duration_text, strides_text, walk_on_bottle
 from ppafo.walking.bottle.supply import SET_PRESSURE, is_of_bottle
 from ppafo.walking.loading import WALKING, on_bottle
 from ppafo.walking.motion import walk_of
+from ppafo.walking.planning import fed_device
 from ppafo.walking.result import WALK_FORMAT
-from ppafo.walking.walk import bottle_life
+from ppafo.walking.walk import silent
 from ppafo.wording import argument_text
 
 WALK_FILE = "walk.json"
@@ -370,8 +372,14 @@ def on_walk(
     walking = on_bottle(scenario, bottle, overrides)
     supply = walk_of(walking).bottle
     assert supply is not None, "a walk on a bottle"
-    course = bottle_life(walking, schedule)
-    end, walked = course.ending, course.walked / walk_of(walking).gait.stride_time
+    # Recorded once a minute, for up to the longest duration: whole minutes, as many as the steps of one run allow.
+    stride = walk_of(walking).gait.stride_time
+    minute = replace(walking, run=replace(walking.run, duration=60.0, output_interval=60.0))
+    seconds_of_run = 60.0 * (MAXIMUM_STEPS * plan_run(minute).step // 60.0)
+    seconds = min(math.ceil(schedule.longest / stride) * stride, seconds_of_run)
+    repeated = replace(minute, run=replace(minute.run, duration=60.0 * max(1, round(seconds / 60.0))))
+    _, course = walk_on_bottle(plan_run(repeated), fed_device(repeated), supply, stride, silent, schedule)
+    end, walked = course.ending, course.walked / stride
     # A bottle may end before the first stride does.
     strides = max(walked, 1.0e-9)
     stride_time, mass = course.walked / strides, course.regulated / strides
@@ -394,9 +402,9 @@ def on_walk(
         strides_when_warm=(supply.mass - smallest_mass_when_warm(supply.bottle, peak, lowest)) / mass,
         ending=TIME_IS_UP if end.kind == WALKED else end.kind,
         message=end.message,
-        mass_left=course.last.mass,
-        usable_when_warm=max(0.0, course.last.mass - smallest_mass_when_warm(supply.bottle, peak)),
-        balance=course.balance._asdict(),
+        mass_left=course.met[-1].state.mass,
+        usable_when_warm=max(0.0, course.met[-1].state.mass - smallest_mass_when_warm(supply.bottle, peak)),
+        balance=course.balance,
         shown=scenario.device.shown,
         # Read where it is wanted; a function of its own could not be pickled.
         record=partial(getattr, course, "recording"),

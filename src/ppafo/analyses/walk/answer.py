@@ -13,13 +13,13 @@ from ppafo.errors import PpafoError
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.reach import torque_reach
 from ppafo.simulation.numbers import declared_numbers
-from ppafo.simulation.scenario import UNITS, Scenario
+from ppafo.simulation.scenario import UNITS
 from ppafo.simulation.tracking.remedies import remedy
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
 from ppafo.version import __version__
-from ppafo.walking.bottle.course import SupplyCourse, duration_text, strides_text
+from ppafo.walking.bottle.coupling import SupplyCourse, duration_text, strides_text
 from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.figures.legs import frames_figure
 from ppafo.walking.figures.mean_stride import walk_figure
@@ -248,7 +248,16 @@ def _trials(worn: WalkResult, drags: bool) -> tuple[str, Sequence[tuple[str, ...
     actuator gives, a stiffer hold is tried; a limit that cuts the request is raised to the torque of the actuator.
     """
     scenario, requested, available = worn.scenario, 0.0, 0.0
-    settings, raised = scenario.controller.settings, _raised_pressures(scenario)
+    settings, supply = scenario.controller.settings, scenario.device.supply
+    levels = {"supply.pressure": supply.pressure}
+    if supply.dorsiflexion_pressure != supply.pressure:
+        levels["supply.dorsiflexion_pressure"] = supply.dorsiflexion_pressure
+    # Supply pressures [Pa] by path, least first, up to what small parts withstand.
+    raised = [
+        {path: STANDARD_ATMOSPHERE + factor * (level - STANDARD_ATMOSPHERE) for path, level in levels.items()}
+        for factor in _PRESSURES
+        if factor * (supply.pressure - STANDARD_ATMOSPHERE) <= _HIGHEST_PRESSURE
+    ]
     if scenario.controller.kind == "off":
         # A controller alone, and with the valve that it needs.
         law, valve = "controller.kind=event_proportional", "device.valve=proportional"
@@ -281,19 +290,6 @@ def _trials(worn: WalkResult, drags: bool) -> tuple[str, Sequence[tuple[str, ...
     )
 
 
-def _raised_pressures(scenario: Scenario) -> list[dict[str, float]]:
-    """Return the supply pressures [Pa] by path that are tried, least first, up to what small parts withstand."""
-    supply = scenario.device.supply
-    paths = {"supply.pressure": supply.pressure}
-    if supply.dorsiflexion_pressure != supply.pressure:
-        paths["supply.dorsiflexion_pressure"] = supply.dorsiflexion_pressure
-    return [
-        {path: STANDARD_ATMOSPHERE + factor * (level - STANDARD_ATMOSPHERE) for path, level in paths.items()}
-        for factor in _PRESSURES
-        if factor * (supply.pressure - STANDARD_ATMOSPHERE) <= _HIGHEST_PRESSURE
-    ]
-
-
 # Data and files of a walk.
 
 
@@ -312,7 +308,7 @@ def _walk_data(comparison: WalkComparison, verdict: ask.Tracking) -> dict[str, A
             "supply": {
                 **supply.supply.to_dict(),
                 "ending": supply.ending._asdict(),
-                "balance": supply.balance._asdict(),
+                "balance": supply.balance,
                 "at_end": {name: float(values[-1]) for name, values in supply.values.items()},
                 "lowest": {name: float(np.min(values)) for name, values in supply.values.items()},
             }
@@ -369,7 +365,7 @@ def _bottle_facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str
         ("bottle", f"{supply.supply.bottle.title}, with {filled}"),
         ("reason for the end", supply.ending.message),
         ("when", f"{duration_text(supply.ending.time)}, {walked}"),
-        ("gas used", f"{_GAS.text(supply.balance.left_bottle)}, left {remaining}"),
+        ("gas used", f"{_GAS.text(supply.balance['left_bottle'])}, left {remaining}"),
         (
             "bottle at the end",
             f"{_WARMTH.text(end['bottle_temperature'])}, {_BOTTLE_PRESSURE.text(end['bottle_pressure'])}",

@@ -1,4 +1,4 @@
-"""Co-simulation of a walk and its gas supply, with data exchange every tenth of a second.
+"""Co-simulation of a walk and its gas supply, with data exchange every tenth of a second, and the supply over time.
 
 Chambers and lines respond within milliseconds; bottle, regulator and hose within seconds. The walk is therefore
 advanced by a tenth of a second with the supply pressure and the largest flow from the start of the interval, then the
@@ -8,9 +8,10 @@ program with supply lines. The walk ends when the bottle can no longer supply th
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from functools import cached_property
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -18,14 +19,146 @@ from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.engine.lanes import BatchResult, Floats, begin_block, effort_for
 from ppafo.engine.rows import leaf_paths, leaves, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
-from ppafo.model.cold_gas import SupplyNow, SupplyState, advance_supply, open_share
+from ppafo.model.cold_gas import DRY_ICE, SupplyNow, SupplyState, advance_supply, open_share
 from ppafo.model.effects.kind import Effect
-from ppafo.model.plant import PlantParameters
 from ppafo.model.source import bottle_content, has_liquid
 from ppafo.parameters.device import Device
 from ppafo.parameters.effects import effect_row
-from ppafo.walking.bottle.course import DIVERGED, UNITS, WALKED, SupplyCourse, SupplyEnding
+from ppafo.report.kind import duration_kind
+from ppafo.signals import Channel, Recording
 from ppafo.walking.bottle.supply import BottleSupply
+
+EndKind = Literal["walk's end", "empty", "too cold", "frozen", "iced", "too little flow", "diverged"]
+WALKED: EndKind = "walk's end"
+DIVERGED: EndKind = "diverged"
+
+UNITS = {
+    "bottle_mass": "kg",
+    "liquid_mass": "kg",
+    "bottle_temperature": "K",
+    "wall_temperature": "K",
+    "bottle_pressure": "Pa",
+    "regulator_temperature": "K",
+    "hose_temperature": "K",
+    "outlet_temperature": "K",
+    "gas_temperature": "K",
+    "regulated_pressure": "Pa",
+    "seat_open": "-",
+}
+"""Series of a supply by name, with their units."""
+
+
+class SupplyEnding(NamedTuple):
+    """End of a walk caused by its gas bottle: reason code, explanation as a sentence, and time [s]."""
+
+    kind: EndKind
+    message: str
+    time: float
+
+
+class Meeting(NamedTuple):
+    """Data exchange between bottle and device: time [s], state of the supply, and its output until the next one."""
+
+    time: float
+    state: SupplyState
+    offered: SupplyNow
+
+
+@dataclass(eq=False)
+class SupplyCourse:
+    """Supply over a walk: exchanges with the device, gas through the regulator [kg], times of walking and of rests [s].
+
+    ``ended`` is the end that the supply caused, None if it lasted until the end of the walk.
+    """
+
+    supply: BottleSupply
+    met: list[Meeting]
+    regulated: float = 0.0
+    walked: float = 0.0
+    rested: float = 0.0
+    ended: SupplyEnding | None = None
+
+    @property
+    def ending(self) -> SupplyEnding:
+        """End of the walk."""
+        last = self.met[-1]
+        over = f"the walk is complete, and {_grams(last.state.mass)} are left in the bottle"
+        return self.ended or SupplyEnding(WALKED, over, last.time)
+
+    @property
+    def times(self) -> Floats:
+        """Times of the exchanges [s] (n,)."""
+        return np.array([meeting.time for meeting in self.met])
+
+    @cached_property
+    def values(self) -> Mapping[str, Floats]:
+        """Series (n,) at the exchanges by name, in the units of ``UNITS``; liquid only of a fluid that has it."""
+        rows = [
+            (
+                state.mass,
+                offered.content.liquid_mass,
+                offered.content.temperature,
+                state.wall_temperature,
+                offered.content.pressure,
+                state.body_temperature,
+                state.hose_temperature,
+                offered.outlet_temperature,
+                offered.gas_temperature,
+                offered.set_pressure,
+                open_share(self.supply.bottle.supply, state.ice),
+            )
+            for _, state, offered in self.met
+        ]
+        values = dict(zip(UNITS, np.array(rows).T.copy(), strict=True))
+        if not has_liquid(self.supply.bottle.fluid.table):
+            del values["liquid_mass"]
+        return values
+
+    @property
+    def recording(self) -> Recording:
+        """State of the supply over the walk as a recording."""
+        channels = {name: Channel(values, UNITS[name]) for name, values in self.values.items()}
+        return Recording(f"bottle {self.supply.bottle.name}", self.times, channels, kind="simulated")
+
+    @property
+    def balance(self) -> dict[str, float]:
+        """Mass and energy balances of the supply from the start of the walk to the end.
+
+        Mass [kg]: left_bottle = regulated + iced, which are the gas that left the bottle, the gas through the regulator
+        and the dry ice in the seat.
+
+        Energy [J]: given_up + ice + room = delivered. ``given_up`` is the energy released by content, wall, regulator
+        and hose, ``ice`` the enthalpy difference of the dry ice in the seat, ``room`` the heat from the room, and
+        ``delivered`` the enthalpy of the gas downstream of the hose.
+        """
+        first, last, supply = self.met[0].state, self.met[-1].state, self.supply.bottle.supply
+        parts = (
+            first.energy - last.energy,
+            supply.wall.wall_heat_capacity * (first.wall_temperature - last.wall_temperature),
+            supply.body.heat_capacity * (first.body_temperature - last.body_temperature),
+            supply.hose.heat_capacity * (first.hose_temperature - last.hose_temperature),
+        )
+        return {
+            "left_bottle": first.mass - last.mass,
+            "regulated": self.regulated,
+            "iced": last.ice,
+            "given_up": sum(parts),
+            "ice": (DRY_ICE - self.supply.line.enthalpies[0]) * last.ice,
+            "room": last.room_heat,
+            "delivered": last.delivered,
+        }
+
+
+def duration_text(seconds: float) -> str:
+    """Return a duration as text with three significant digits, in seconds to 2 min, in whole minutes from 1000 min."""
+    kind = duration_kind(seconds)
+    return kind.text(seconds, ".0f" if kind.values(seconds) >= 999.5 else ".3g")
+
+
+def strides_text(strides: float) -> str:
+    """Return a number of strides as text, with one decimal below 100 and none above."""
+    return f"{strides:.1f}" if strides < 99.5 else f"{strides:.0f}"
+
 
 REGULATED, _LINE = "line_state.regulated_mass", "line_state.mass_1"
 """Paths of the rows for the gas through a line's regulator, and for the gas in the line [kg]."""
@@ -77,98 +210,39 @@ def walk_on_bottle(
     schedule, the walk has its rests, and is repeated until the bottle is exhausted or the schedule over. ``progress``
     is called with the minutes simulated and the total number of minutes.
     """
-    use = _BottleInUse([_Meeting(0.0, supply.start(), supply.offers_first())])
-    result, done = _use_bottle(run, device, supply, stride_time, use, progress, schedule)
-    while schedule is not None and use.ending is None and use.walked + use.rested < schedule.longest:
-        result, done = _use_bottle(run, device, supply, stride_time, use, progress, schedule)
-    is_whole = done == batch_of(run).clock.step_count
-    record = result.record if is_whole else result.record[: (done - 1) // int(run.record_every) + 1]
-    return BatchResult(result.states, record), _course_of_use(supply, use)
+    course = SupplyCourse(supply, [Meeting(0.0, supply.start(), supply.offers_first())])
+    rows = _walk_once(run, device, course, stride_time, progress, schedule)
+    while schedule is not None and course.ended is None and course.walked + course.rested < schedule.longest:
+        rows = _walk_once(run, device, course, stride_time, progress, schedule)
+    return rows, course
 
 
-class _Meeting(NamedTuple):
-    """Data exchange between bottle and device: time [s], state of the supply, and its output until the next one."""
-
-    time: float
-    state: SupplyState
-    offered: SupplyNow
-
-
-@dataclass(slots=True)
-class _BottleInUse:
-    """Bottle during a walk: exchanges with the device, time walked and rested [s], gas through the regulator [kg]."""
-
-    met: list[_Meeting]
-    walked: float = 0.0
-    rested: float = 0.0
-    regulated: float = 0.0
-    ending: SupplyEnding | None = None
-
-
-def _course_of_use(supply: BottleSupply, use: _BottleInUse) -> SupplyCourse:
-    """Return the state of a bottle over a walk; without another ending, the supply lasted until the end of the walk."""
-    last = use.met[-1]
-    over = f"the walk is complete, and {_grams(last.state.mass)} are left in the bottle"
-    # In the order of ``UNITS``.
-    rows = [
-        (
-            state.mass,
-            offered.content.liquid_mass,
-            offered.content.temperature,
-            state.wall_temperature,
-            offered.content.pressure,
-            state.body_temperature,
-            state.hose_temperature,
-            offered.outlet_temperature,
-            offered.gas_temperature,
-            offered.set_pressure,
-            open_share(supply.bottle.supply, state.ice),
-        )
-        for _, state, offered in use.met
-    ]
-    values = dict(zip(UNITS, np.array(rows).T.copy(), strict=True))
-    if not has_liquid(supply.bottle.fluid.table):
-        del values["liquid_mass"]
-    return SupplyCourse(
-        supply=supply,
-        times=np.array([meeting.time for meeting in use.met]),
-        values=values,
-        first=use.met[0].state,
-        last=last.state,
-        regulated=use.regulated,
-        walked=use.walked,
-        rested=use.rested,
-        ending=use.ending or SupplyEnding(WALKED, over, last.time),
-    )
-
-
-def _use_bottle(
+def _walk_once(
     run: Run,
     device: Device,
-    supply: BottleSupply,
+    course: SupplyCourse,
     stride_time: float,
-    use: _BottleInUse,
     progress: Callable[[float, float], None],
     schedule: Schedule | None,
-) -> tuple[BatchResult, int]:
-    """Simulate a run on a bottle and update ``use`` in place; return the rows of the run and the number of steps."""
-    batch = batch_of(run)
+) -> BatchResult:
+    """Simulate a run on a bottle and continue ``course`` in place; return the rows of the run, up to its end."""
+    batch, supply, met = batch_of(run), course.supply, course.met
     count = batch.clock.step_count
     block = begin_block(batch, effort_for(batch))
     states = row_numbers(batch.program.state_rows())
     regulated, lines = ([row for path, row in states.items() if path.endswith(end)] for end in (REGULATED, _LINE))
-    every, walked_before = max(1, round(supply.coupling / run.step)), use.walked
-    lanes = _Lanes.of(run, device, use.met[0].offered.gas_temperature)
+    every, walked_before = max(1, round(supply.coupling / run.step)), course.walked
+    lanes = _Lanes(run, device, met[0].offered.gas_temperature)
     # The line falls for a moment at each draw: its best over some strides counts, of two meetings at least.
     window = max(2, math.ceil(_STRIDES * stride_time / (every * run.step))) * every
     # The line starts at the set pressure.
     gauges = [(0, 1.0)]
     done, first = 0, float(batch.states[regulated, 0].sum())
-    before, until_rest = first, count
-    if schedule is not None and schedule.rest > 0.0:
-        until_rest = max(1, round((schedule.walk - use.walked % schedule.walk) / run.step))
-    while use.ending is None and done < count:
-        meeting = use.met[-1]
+    before = first
+    walk, rest, longest = schedule or Schedule(math.inf, 0.0, math.inf)
+    until_rest = max(1, round((walk - course.walked % walk) / run.step)) if rest > 0.0 else count
+    while course.ended is None and done < count and course.walked + course.rested < longest:
+        meeting = met[-1]
         # More often where much of what is left may flow out between two meetings.
         largest_flow = max(meeting.offered.largest_flow, _LEAST_FLOW)
         most = max(1, min(every, int(_LARGEST_DRAW * meeting.state.mass / (largest_flow * run.step))))
@@ -176,75 +250,67 @@ def _use_bottle(
         block.set_parameters(lanes.rows, lanes.parameters(meeting.offered))
         block.advance(steps)
         done, until_rest = done + steps, until_rest - steps
-        use.walked = walked_before + done * run.step
-        time = use.walked + use.rested
-        progress(use.walked / 60.0, (walked_before + count * run.step) / 60.0)
+        course.walked = walked_before + done * run.step
+        time = course.walked + course.rested
+        progress(course.walked / 60.0, (walked_before + count * run.step) / 60.0)
         # Divergence first: a gas mass that is no number must not reach the supply.
         failed = float(block.states[states["result.failure_time"], 0])
         if failed < NEVER_FAILED or not bool(np.isfinite(block.states).all()):
             message = f"the walk diverged with {_grams(meeting.state.mass)} left in the bottle"
-            use.ending = SupplyEnding(DIVERGED, message, min(time, failed))
+            course.ended = SupplyEnding(DIVERGED, message, min(time, failed))
             break
         regulated_mass = float(block.states[regulated, 0].sum())
         drawn, before = regulated_mass - before, regulated_mass
-        use.met.append(_met_again(supply, meeting, drawn, steps * run.step, time))
-        offered = use.met[-1].offered
+        met.append(_met_again(supply, meeting, drawn, steps * run.step, time))
         gauges = [
             *((step, gauge) for step, gauge in gauges if step > done - window),
-            (done, min(lanes.gauge(float(block.states[line, 0]), offered) for line in lines)),
+            (done, min(lanes.gauge(float(block.states[line, 0]), met[-1].offered) for line in lines)),
         ]
-        use.ending = _ending(supply, use.met[-1], max(gauge for _, gauge in gauges))
-        if schedule is not None and use.ending is None:
-            if time >= schedule.longest:
-                break
-            if until_rest <= 0 and schedule.rest > 0.0:
-                rest = min(schedule.rest, schedule.longest - time)
-                parts = max(1, math.ceil(rest / _RESTING))
-                # The bottle warms, and no gas flows.
-                for _ in range(parts):
-                    meeting = use.met[-1]
-                    use.met.append(_met_again(supply, meeting, 0.0, rest / parts, meeting.time + rest / parts))
-                use.rested += rest
-                # Gauges of before the rest say nothing of the bottle that has warmed in it.
-                gauges, until_rest = [(done, 1.0)], round(schedule.walk / run.step)
-                if use.walked + use.rested >= schedule.longest:
-                    break
-    use.regulated += before - first
-    return block.result(), done
+        course.ended = _ending(supply, met[-1], max(gauge for _, gauge in gauges))
+        if course.ended is None and rest > 0.0 and until_rest <= 0 and time < longest:
+            resting = min(rest, longest - time)
+            parts = max(1, math.ceil(resting / _RESTING))
+            # The bottle warms, and no gas flows.
+            for _ in range(parts):
+                met.append(_met_again(supply, met[-1], 0.0, resting / parts, met[-1].time + resting / parts))
+            course.rested += resting
+            # Gauges of before the rest say nothing of the bottle that has warmed in it.
+            gauges, until_rest = [(done, 1.0)], round(walk / run.step)
+    course.regulated += before - first
+    result = block.result()
+    record = result.record if done == count else result.record[: (done - 1) // int(run.record_every) + 1]
+    return BatchResult(result.states, record)
 
 
-def _met_again(supply: BottleSupply, meeting: _Meeting, drawn: float, duration: float, time: float) -> _Meeting:
+def _met_again(supply: BottleSupply, meeting: Meeting, drawn: float, duration: float, time: float) -> Meeting:
     """Return the exchange at ``time`` [s], after the device has drawn a mass ``drawn`` [kg] over ``duration`` [s]."""
     table, content = supply.bottle.fluid.table, meeting.offered.content
     state = advance_supply(table, supply.line, supply.bottle.supply, meeting.state, content, drawn, duration)
-    return _Meeting(time, state, supply.offers(state, content.temperature, drawn))
+    return Meeting(time, state, supply.offers(state, content.temperature, drawn))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class _Lanes:
-    """Parameters of the walk program that depend on the state of the supply.
+    """Parameters of a walk program that depend on the state of the supply.
 
-    ``rows`` are the rows of these parameters in the program. ``plant`` has the values for gas at the temperature
-    ``start`` [K], ``volume`` is the volume of the line [m^3]. ``effects`` are the active effects of the ``device``,
-    whose parameters may depend on the gas temperature.
+    The run was planned for its ``device`` and gas at the temperature ``start`` [K].
     """
 
-    rows: list[int]
-    plant: PlantParameters
-    volume: float
-    start: float
+    run: Run
     device: Device
-    effects: tuple[Effect, ...]
+    start: float
 
-    @classmethod
-    def of(cls, run: Run, device: Device, start: float) -> "_Lanes":
-        """Return the supply-dependent parameters of a run that was planned for gas at the temperature ``start`` [K]."""
-        assert run.lines is not None, "a bottle feeds lines"
-        effects = tuple(effect for effect in run.program.effects if effect.is_of_device)
-        names = row_numbers(run.program.parameter_rows())
-        of_effects = [path for effect in effects for path in leaf_paths(effect.parameters, effect.name)]
-        rows = [names[path] for path in (*_PARAMETERS, *of_effects)]
-        return cls(rows, run.plant, run.lines.parameters.volume_1, start, device, effects)
+    @cached_property
+    def effects(self) -> tuple[Effect, ...]:
+        """Active effects of the device, whose parameters may depend on the gas temperature."""
+        return tuple(effect for effect in self.run.program.effects if effect.is_of_device)
+
+    @cached_property
+    def rows(self) -> list[int]:
+        """Rows of the parameters in the program."""
+        names = row_numbers(self.run.program.parameter_rows())
+        of_effects = [path for effect in self.effects for path in leaf_paths(effect.parameters, effect.name)]
+        return [names[path] for path in (*_PARAMETERS, *of_effects)]
 
     def parameters(self, now: SupplyNow) -> Floats:
         """Return the values of the parameters that depend on the supply, in the order of ``rows``.
@@ -252,7 +318,7 @@ class _Lanes:
         The gas product is proportional to the gas temperature T, the conductances of valve and leak to 1/sqrt(T). Set
         pressure and largest flow of the regulator follow, then the parameters of the effects at the temperature T.
         """
-        plant, warmth = self.plant, now.gas_temperature / self.start
+        plant, warmth = self.run.plant, now.gas_temperature / self.start
         # Mass flow at given pressures goes with one over the root of the temperature of the gas.
         slower = 1.0 / math.sqrt(warmth)
         product, valve, leak = plant.gas_product, plant.valve_conductance, plant.leak_conductance
@@ -262,12 +328,13 @@ class _Lanes:
 
     def gauge(self, mass: float, now: SupplyNow) -> float:
         """Return the gauge pressure of the line, which contains a mass [kg], divided by the set gauge pressure [-]."""
-        plant = self.plant
-        pressure = mass * plant.gas_product * now.gas_temperature / (self.start * self.volume)
+        plant, lines = self.run.plant, self.run.lines
+        assert lines is not None, "a bottle feeds lines"
+        pressure = mass * plant.gas_product * now.gas_temperature / (self.start * lines.parameters.volume_1)
         return (pressure - plant.atmospheric_pressure) / (plant.supply_pressure - plant.atmospheric_pressure)
 
 
-def _ending(supply: BottleSupply, meeting: _Meeting, reached: float) -> SupplyEnding | None:
+def _ending(supply: BottleSupply, meeting: Meeting, reached: float) -> SupplyEnding | None:
     """Return the end of a walk caused by its supply, or None if the walk continues.
 
     ``reached`` is the largest recent gauge pressure of the line divided by the set gauge pressure [-].

@@ -1,6 +1,5 @@
 """Gas bottle of a walk file: parameters, gas downstream of the regulator, and settings that conflict with a bottle."""
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -160,25 +159,9 @@ def read_bottle(reading: DocumentReader, device: Device) -> BottleSupply | None:
     entry = Entry(value=pressure, unit="Pa_a", origin="derived", source="supply.pressure of the walk")
     regulator = bottle.regulator._replace(set_pressure=pressure)
     bottle = replace(bottle, regulator=regulator, entries={**bottle.entries, SET_PRESSURE: entry})
-    numbers = _numbers(reading, section, bottle)
-    line = isobar(bottle.fluid.table, bottle.regulator.set_pressure)
-    supply = BottleSupply(
-        bottle,
-        line,
-        numbers["fill"] * bottle.mass,
-        # The order of BOTTLE_NUMBERS is that of the fields after the mass.
-        *(numbers[quantity.name] for quantity in BOTTLE_NUMBERS if quantity is not FILL),
-    )
-    _check(reading, device, supply)
-    return supply
-
-
-def _numbers(reading: DocumentReader, section: Mapping[str, Any], bottle: Bottle) -> dict[str, float]:
-    """Return the numbers of the bottle section; the default temperature at the start is the room temperature."""
-    room = replace(TEMPERATURE, default=bottle.room_temperature)
-    items = (
-        room if quantity is TEMPERATURE and TEMPERATURE.name not in section else quantity for quantity in BOTTLE_NUMBERS
-    )
+    # The default temperature at the start is the one of the room.
+    at_room = replace(TEMPERATURE, default=bottle.room_temperature)
+    items = (at_room if quantity is TEMPERATURE else quantity for quantity in BOTTLE_NUMBERS)
     numbers = {quantity.name: reading.number(f"{BOTTLE}.{quantity.name}", quantity) for quantity in items}
     nodes = bottle.fluid.table.temperatures
     if not nodes[0] < numbers["temperature"] <= nodes[-1]:
@@ -190,26 +173,22 @@ def _numbers(reading: DocumentReader, section: Mapping[str, Any], bottle: Bottle
         fits = f"only {GRAMS_PER_KILOGRAM * most:.4g} g fit into the bottle at {numbers['temperature']:g} K"
         given = f"{GRAMS_PER_KILOGRAM * mass:.4g} g of {bottle.fluid.name}"
         raise ScenarioError(f"{reading.file}: [{BOTTLE}]: {BOTTLE}.fill is {given}, but {fits}")
-    return numbers
-
-
-def is_of_bottle(molar_mass: float, bottle: Bottle) -> bool:
-    """Tell whether a molar mass [kg/mol] agrees with the gas of a bottle."""
-    ratio = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass) / bottle.fluid.table.gas_constant
-    return abs(ratio - 1.0) <= _SAME_GAS
-
-
-def _check(reading: DocumentReader, device: Device, supply: BottleSupply) -> None:
-    """Raise ScenarioError for settings of a walk that conflict with a bottle."""
-    regulator = supply.bottle.regulator
+    line = isobar(bottle.fluid.table, bottle.regulator.set_pressure)
+    supply = BottleSupply(
+        bottle,
+        line,
+        mass,
+        # The order of BOTTLE_NUMBERS is that of the fields after the mass.
+        *(numbers[quantity.name] for quantity in BOTTLE_NUMBERS if quantity is not FILL),
+    )
     if device.supply.relieving:
         raise ScenarioError(f"{reading.file}: supply.relieving: must be false with a bottle, which takes no gas back")
     if kind_at(reading.document, "gas_model") == THERMAL:
         raise reading.refusal("gas_model.kind", "assumes gas at room temperature; omit gas_model.kind, or the bottle")
-    for path in _OWN:
-        if value_at(reading.document, path) is not None:
+    for key in _OWN:
+        if value_at(reading.document, key) is not None:
             raise reading.refusal(
-                path, f"must be omitted for a walk with a bottle; set {BOTTLE}.regulator.droop or .area"
+                key, f"must be omitted for a walk with a bottle; set {BOTTLE}.regulator.droop or .area"
             )
     # Refuse a bottle of so little gas, or parts of so little heat capacity, that they follow within no time.
     flow = supply.offers_first().largest_flow
@@ -226,3 +205,10 @@ def _check(reading: DocumentReader, device: Device, supply: BottleSupply) -> Non
         atmosphere, needed = device.supply.atmospheric_pressure, regulator.set_pressure + regulator.pressure_margin
         has, needs = (shown_text(each, "Pa_a", atmosphere=atmosphere) for each in (pressure, needed))
         raise reading.refusal(BOTTLE_NAME, f"has {has} at the start, but its regulator needs {needs}")
+    return supply
+
+
+def is_of_bottle(molar_mass: float, bottle: Bottle) -> bool:
+    """Tell whether a molar mass [kg/mol] agrees with the gas of a bottle."""
+    ratio = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass) / bottle.fluid.table.gas_constant
+    return abs(ratio - 1.0) <= _SAME_GAS
