@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,24 +17,17 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of
 from ppafo.walking.wearer import Wearer
 
-_OF_DEVICE = ("actuator.angle_max", "actuator.angle_min")
-"""End stops of the device, which cannot be set by a key of a walk file."""
 SHORTEST_FIRST, LONGEST_FIRST = 0.5, 2.0
 """Limits of the expected time of the first stride, in strides of the gait."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Pair:
-    """Required relation between two numbers of a walk: number at ``path`` below, above, at most or at least ``other``.
-
-    ``unit`` is the SI unit of both, ``words`` the explanation in the message, empty if the relation is explanation
-    enough.
-    """
+class _Pair(NamedTuple):
+    """Required relation between two numbers of a walk with the SI unit of both; ``words`` explain it in the message."""
 
     path: str
     relation: str
     other: str
-    unit: str
+    unit: str = ""
     words: str = ""
 
 
@@ -43,16 +35,15 @@ PAIRS = (
     _Pair("wearer.shank_mass_centre", "at most", "wearer.shank_length", "m", "lies beyond the ankle"),
     _Pair("wearer.foot_mass_centre", "at most", "wearer.toe_lever", "m", "lies beyond the toes"),
     _Pair("controller.unload_threshold", "below", "controller.load_threshold", "N"),
-    _Pair("controller.push_off_end", "above", "controller.push_off_start", ""),
+    _Pair("controller.push_off_end", "above", "controller.push_off_start"),
     _Pair(
-        "controller.rise_time", "at most", "controller.peak_time", "", "the torque would rise before the heel strike"
+        "controller.rise_time", "at most", "controller.peak_time", words="the torque would rise before the heel strike"
     ),
     _Pair(
         "controller.peak_time",
         "at least",
         "controller.push_off_start",
-        "",
-        "the peak would be over before the push-off",
+        words="the peak would be over before the push-off",
     ),
 )
 
@@ -64,10 +55,23 @@ BEYOND_STOP = math.radians(5.0)
 
 def contradictions(scenario: Scenario) -> Iterator[Contradiction]:
     """Yield the check of every pair of numbers that could contradict each other, with its result."""
-    yield from _of_stops(scenario)
-    wearer = walk_of(scenario).wearer
-    numbers = {f"controller.{name}": number for name, number in scenario.controller.settings.items()}
-    numbers |= {f"wearer.{name}": getattr(wearer, name) for name in Wearer.__dataclass_fields__}
+    motion, actuator = walk_of(scenario), scenario.device.actuator
+    gait, lowest, highest = motion.gait, actuator.angle_min, actuator.angle_max
+    low, high = angles_of_gait(scenario)
+    needed = f"the gait needs {math.degrees(low):.0f} to {math.degrees(high):.0f} deg"
+    yield Contradiction(
+        "actuator.angle_max",
+        highest < high - BEYOND_STOP,
+        lambda run: f"{needed}, but the upper stop is at {_text(highest, run, 'rad')}",
+    )
+    yield Contradiction(
+        "actuator.angle_min",
+        lowest > low + BEYOND_STOP,
+        lambda run: f"{needed}, but the lower stop is at {_text(lowest, run, 'rad')}",
+    )
+    settings, valve, kind = scenario.controller.settings, scenario.device.valve.kind, scenario.controller.kind
+    numbers = {f"controller.{name}": number for name, number in settings.items()}
+    numbers |= {f"wearer.{name}": getattr(motion.wearer, name) for name in Wearer.__dataclass_fields__}
     for pair in PAIRS:
         if pair.path in numbers and pair.other in numbers:
             number, other = numbers[pair.path], numbers[pair.other]
@@ -82,7 +86,6 @@ def contradictions(scenario: Scenario) -> Iterator[Contradiction]:
     # An object in charge has no settings that could contradict.
     if scenario.controller.is_outside:
         return
-    settings, valve, kind = scenario.controller.settings, scenario.device.valve.kind, scenario.controller.kind
     switching = "" if WALKING_CONTROLLERS.is_own(kind) else switching_remedy(kind)
     fitting = " or ".join(sorted(kind.name for kind in WALKING_CONTROLLERS.values() if kind.only_switches))
     yield Contradiction(
@@ -95,7 +98,7 @@ def contradictions(scenario: Scenario) -> Iterator[Contradiction]:
     )
     # A controller with a threshold of force finds the events of the gait by itself.
     if "load_threshold" in settings:
-        stride, first = walk_of(scenario).gait.stride_time, settings["first_stride_time"]
+        stride, first, swing = gait.stride_time, settings["first_stride_time"], settings["swing_angle"]
         yield Contradiction(
             "controller.first_stride_time",
             np.logical_or(first <= SHORTEST_FIRST * stride, first >= LONGEST_FIRST * stride),
@@ -103,7 +106,21 @@ def contradictions(scenario: Scenario) -> Iterator[Contradiction]:
                 f"must be between half and twice the stride time of the gait, {_text(round(stride, 4), run, 's')}"
             ),
         )
-        yield from _of_swing(scenario)
+        yield Contradiction(
+            "controller.swing_angle",
+            np.logical_or(swing <= lowest, swing >= highest),
+            lambda run: (
+                f"must be in the range of the device, {_text(lowest, run, 'rad')} to {_text(highest, run, 'rad')}"
+            ),
+        )
+        yield Contradiction(
+            "controller.kind",
+            gait.vertical_force is None,
+            lambda _run: (
+                f"needs force sensors, and gait '{gait.name}' has no vertical_force; import the gait with ground "
+                "reaction forces, or set controller.kind=off"
+            ),
+        )
     if "peak_time" in settings:
         peak, fall = settings["peak_time"], settings["fall_time"]
         yield Contradiction(
@@ -117,43 +134,6 @@ def angles_of_gait(scenario: Scenario) -> tuple[float, float]:
     """Return the lowest and highest ankle angle [rad] of the gait of a walk."""
     angles = walk_of(scenario).gait.ankle_angle.values_at(_PHASES)
     return float(np.min(angles)), float(np.max(angles))
-
-
-def _of_stops(scenario: Scenario) -> Iterator[Contradiction]:
-    """Yield the checks of the gait's ankle angles against the end stops of the device."""
-    actuator, (low, high) = scenario.device.actuator, angles_of_gait(scenario)
-    needed = f"the gait needs {math.degrees(low):.0f} to {math.degrees(high):.0f} deg"
-    highest, lowest = _OF_DEVICE
-    yield Contradiction(
-        highest,
-        actuator.angle_max < high - BEYOND_STOP,
-        lambda run: f"{needed}, but the upper stop is at {_text(actuator.angle_max, run, 'rad')}",
-    )
-    yield Contradiction(
-        lowest,
-        actuator.angle_min > low + BEYOND_STOP,
-        lambda run: f"{needed}, but the lower stop is at {_text(actuator.angle_min, run, 'rad')}",
-    )
-
-
-def _of_swing(scenario: Scenario) -> Iterator[Contradiction]:
-    """Yield the checks of the swing angle against the range of the device, and of the presence of a vertical force."""
-    settings, actuator = scenario.controller.settings, scenario.device.actuator
-    lowest, highest = actuator.angle_min, actuator.angle_max
-    swing, gait = settings["swing_angle"], walk_of(scenario).gait
-    yield Contradiction(
-        "controller.swing_angle",
-        np.logical_or(swing <= lowest, swing >= highest),
-        lambda run: f"must be in the range of the device, {_text(lowest, run, 'rad')} to {_text(highest, run, 'rad')}",
-    )
-    yield Contradiction(
-        "controller.kind",
-        gait.vertical_force is None,
-        lambda _run: (
-            f"needs force sensors, and gait '{gait.name}' has no vertical_force; import the gait with ground "
-            "reaction forces, or set controller.kind=off"
-        ),
-    )
 
 
 def _text(number: Any, run: int, unit: str) -> str:

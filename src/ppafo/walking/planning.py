@@ -68,25 +68,24 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         sensors=gait_sensors_of(scenario),
         initial=of_each(lambda leg: walk_from_strike(gait_at(gait, timing, leg, 0.0)), leg),
     )
-    now = walk.initial.now
+    now, lines = walk.initial.now, scenario.supply_lines
+    times = scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
+
+    def steps(plant: PlantParameters) -> TimeGrid:
+        """Time grid: steps that resolve the gas, a whole number per sample of the controller."""
+        volume = smallest_chamber(*(vented_chambers(device, plant, angle) for angle in (LOWEST_ANGLE, HIGHEST_ANGLE)))
+        # Lines may be smaller than any chamber, and then fill first.
+        volume = volume if lines is None else smaller(volume, smaller(lines.volume_1, lines.volume_2))
+        return walk_step_counts(*times, plant, volume, scenario.stiffness), False, 1.0
+
     run, problems = compose_run(
         scenario,
         with_leg(bare, leg),
-        lambda plant: walk_steps(scenario, plant),
+        steps,
         lambda plant: vented_state(plant, vented_chambers(device, plant, now.ankle), now.ankle, now.ankle_rate),
         walk,
     )
     return run, (*problems, *stiff_loads(run))
-
-
-def walk_steps(scenario: Scenario, plant: PlantParameters) -> TimeGrid:
-    """Return the time grid of a walk: steps that resolve the gas, a whole number per sample of the controller."""
-    lowest, highest = (vented_chambers(scenario.device, plant, angle) for angle in (LOWEST_ANGLE, HIGHEST_ANGLE))
-    lines, volume = scenario.supply_lines, smallest_chamber(lowest, highest)
-    # Lines may be smaller than any chamber, and then fill first.
-    volume = volume if lines is None else smaller(volume, smaller(lines.volume_1, lines.volume_2))
-    times = scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
-    return walk_step_counts(*times, plant, volume, scenario.stiffness), False, 1.0
 
 
 def stiff_loads(run: Run) -> tuple[Problem, ...]:

@@ -208,16 +208,7 @@ _EVENT_BASED = {
 }
 """Torque laws with a separate name and summary in walking."""
 
-_COMPETING = (
-    event_on_off.EVENT_ON_OFF,
-    _EVENT_BASED[switching.ON_OFF_DEAD_ZONE],
-    _EVENT_BASED[PROPORTIONAL],
-    _EVENT_BASED[pid.PID],
-    _EVENT_BASED[model_based.PID_FEEDFORWARD],
-    _EVENT_BASED[switching.SLIDING_MODE],
-    _EVENT_BASED[model_based.FEEDBACK_LINEARISATION],
-    event_on_off.OFF,
-)
+_COMPETING = (event_on_off.EVENT_ON_OFF, *_EVENT_BASED.values(), event_on_off.OFF)
 WALKING_CONTROLLERS: Kinds[ControllerKind] = Kinds(
     "ppafo.walking_controllers", "controller of walking", ControllerKind, {kind.name: kind for kind in _COMPETING}
 )

@@ -1,7 +1,6 @@
 """Stick figures of the leg in a walk and in the healthy gait, and instants of a stride as single frames."""
 
 import textwrap
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,33 +32,21 @@ _VIEW = (-0.36, 0.86)
 """Lowest and highest point of a row [m]: below the ground is the percent of the stride, above the legs the name."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LegPostures:
-    """Postures in a walk and in the healthy gait at the same instants, and their running phases [strides].
+def legs_of(result: WalkResult, turns: Floats) -> tuple[Posture, Posture, list[bool]]:
+    """Return the postures in a walk and in the healthy gait at running phases [strides] of the recording.
 
-    ``drags``: True at instants of mid-swing with toes below the ground, as in the metric ``lowest_toes``
+    The last list is True at instants of mid-swing with toes below the ground, as in the metric ``lowest_toes``.
     """
-
-    turns: Floats
-    worn: Posture
-    healthy: Posture
-    drags: list[bool]
-
-
-def legs_of(result: WalkResult, turns: Floats) -> LegPostures:
-    """Return the postures of a walk at running phases [strides], counted from the start of the recording."""
-    configuration, recording = result.scenario, result.recording
-    gait = walk_of(configuration).gait
-    timing = gait_timing(gait)
-    path = ankle_path(gait, timing, walk_of(configuration).wearer)
+    motion, recording = walk_of(result.scenario), result.recording
+    timing = gait_timing(motion.gait)
+    path = ankle_path(motion.gait, timing, motion.wearer)
     # All strides have the stride time of the gait.
-    times = turns * gait.stride_time
+    times = turns * motion.gait.stride_time
     names = ("shank_angle", "angle", "healthy_angle")
     shank, angle, healthy = (np.interp(times, recording.time, recording[name]) for name in names)
     worn, phases = path.posture(turns, shank, angle), turns % 1.0
     must_clear = (phases >= timing.clearance_from) & (phases < timing.clearance_to)
-    drags = (must_clear & (worn.toe[:, 1] < 0.0)).tolist()
-    return LegPostures(turns, worn, path.posture(turns, shank, healthy), drags)
+    return worn, path.posture(turns, shank, healthy), (must_clear & (worn.toe[:, 1] < 0.0)).tolist()
 
 
 def phases_of_last_stride(result: WalkResult, count: int) -> Floats:
@@ -123,17 +110,17 @@ def _draw_frames(axes: "Axes", result: WalkResult, label: str, colour: str, coun
     if count < _FRAMES:
         # Of few instants some are in the middle of stance, of push-off and of the swing.
         turns = turns + 0.5 / count
-    legs = legs_of(result, turns)
+    worn, healthy, drags = legs_of(result, turns)
     ground = [0.0, _SLOT * turns.size]
     axes.plot(ground, [0.0, 0.0], color=GREY, linewidth=1.0, zorder=1)
     axes.fill_between(ground, [-0.25, -0.25], [0.0, 0.0], color="#f1f1f1", linewidth=0.0, zorder=0)
     for index in range(turns.size):
         middle = _SLOT * (index + 0.47)
-        offset = legs.healthy.ankle[index, 0] - middle
-        _draw_leg(axes, legs.healthy, index, offset, _GHOST, 1.0, is_ghost=True)
-        _draw_leg(axes, legs.worn, index, offset, colour, 2.2)
-        if legs.drags[index]:
-            toe = legs.worn.toe[index] - (offset, 0.0)
+        offset = healthy.ankle[index, 0] - middle
+        _draw_leg(axes, healthy, index, offset, _GHOST, 1.0, is_ghost=True)
+        _draw_leg(axes, worn, index, offset, colour, 2.2)
+        if drags[index]:
+            toe = worn.toe[index] - (offset, 0.0)
             axes.plot(toe[0], toe[1], "x", color=_DRAGS, markersize=7, markeredgewidth=1.8, zorder=5)
         percent = f"{100.0 * (turns[index] % 1.0):.0f} %"
         axes.text(middle, -0.19, percent, ha="center", va="top", fontsize=font_size(8.5), color=GREY)
