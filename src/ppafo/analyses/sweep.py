@@ -144,9 +144,10 @@ def sweep_into_folder(
     seed: Seed | None = None,
     **running: Any,
 ) -> Finding[StudyResults]:
-    """Run a study into a folder with its figure, page and text: the command.
+    """Run a study: many runs, one row each, resumable.
 
-    An interrupt is raised again with a message on whether the same command resumes the study.
+    The command: it writes the folder with figure, page and text. An interrupt is raised again with a message on whether
+    the same command resumes the study.
     """
     from ppafo.report.drawing import load_drawing
     from ppafo.report.finding import page_files, text_of

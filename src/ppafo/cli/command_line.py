@@ -12,9 +12,11 @@ import types
 import typing
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from itertools import takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn, final
+from types import CodeType
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, cast, final
 
 from ppafo.arguments.reading import Word, number, whole_number
 from ppafo.arguments.values import annotated_parameters
@@ -25,6 +27,8 @@ from ppafo.plugins import name_modules_in, name_plugins
 from ppafo.wording import nearest_name, read_by
 
 if TYPE_CHECKING:
+    from importlib.abc import InspectLoader
+
     from _typeshed import SupportsWrite
 
     from ppafo.documents.toml_text import TomlKind
@@ -50,8 +54,7 @@ class Command:
     ``library`` is the ``TomlKind`` of the bundled files (``module:NAME``), for ``--list``. ``listing`` is the function
     (``module:function``) that returns the entries of that list, by default built from the files, and ``listed`` is the
     noun for the entries. ``default_folder`` maps the parameters by name to the result folder used without ``--out``;
-    without it nothing is written by default. ``first_line`` repeats the first line of the docstring if loading the
-    function would slow down the list of commands.
+    without it nothing is written by default.
     """
 
     verb: str
@@ -59,7 +62,6 @@ class Command:
     listing: str = ""
     listed: str = ""
     default_folder: str = ""
-    first_line: str = ""
     loaded_verb: _Verb | None = None
     """Function of a command from another package, in place of a location."""
 
@@ -71,7 +73,15 @@ class Command:
     @property
     def summary(self) -> str:
         """Summary of the command: first line of the function's docstring."""
-        first_line = self.first_line or (inspect.getdoc(self.function()) or "").split("\n", 1)[0]
+        module, _, name = self.verb.partition(":")
+        if self.loaded_verb is None and (spec := find_spec(module)) is not None and spec.loader is not None:
+            # Of the module as it is compiled: to run its imports would slow down the list of commands.
+            code = cast("InspectLoader", spec.loader).get_code(module)
+            parts = () if code is None else code.co_consts
+            said = next(part.co_consts[0] for part in parts if isinstance(part, CodeType) and part.co_name == name)
+        else:
+            said = inspect.getdoc(self.function()) or ""
+        first_line = str(said).split("\n", 1)[0]
         return first_line[:1].lower() + first_line[1:].rstrip(".")
 
     @property

@@ -15,16 +15,15 @@ _SETS, _GAITS = f"{_VERBS}:sets_list", f"{_VERBS}:gait_list"
 _STUDIES = "ppafo.studies.loading:STUDY_FILES", "ppafo.analyses.study_results:studies_of_the_package"
 
 
-def _of_scenario(verb: str, first_line: str = "") -> Command:
+def _of_scenario(verb: str) -> Command:
     """Declare a command that takes scenarios and walks by name."""
-    return Command(verb, listing="ppafo.cli.simulate:list_descriptions", listed="scenario", first_line=first_line)
+    return Command(verb, listing="ppafo.cli.simulate:list_descriptions", listed="scenario")
 
 
 _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
     "the paper": {
         "reproduce": Command(
             f"{_ANALYSES}.reproduce.question:reproduce",
-            first_line="Reproduce the paper's experiments and check its claims.",
             library="ppafo.analyses.reproduce.claims:FILE",
             listing="ppafo.analyses.reproduce.claims:list_studies",
         ),
@@ -45,57 +44,20 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
     "from bench to model": {
         "rig": CommandGroup(
             "record synthetic data on the simulated test bench",
-            {
-                "simulate": Command(f"{_VERBS}:rig_simulate", listing=f"{_VERBS}:list_rig", listed="experiment"),
-            },
+            {"simulate": Command(f"{_VERBS}:rig_simulate", listing=f"{_VERBS}:list_rig", listed="experiment")},
         ),
-        "identify": Command(
-            f"{_ANALYSES}.identify:identify",
-            first_line="Identify a parameter set, with uncertainty, from bench recordings.",
-        ),
-        "validate": Command(
-            f"{_ANALYSES}.validate:validate",
-            listing=_SETS,
-            first_line="Compare a parameter set with recordings, channel by channel.",
-        ),
+        "identify": Command(f"{_ANALYSES}.identify:identify"),
+        "validate": Command(f"{_ANALYSES}.validate:validate", listing=_SETS),
     },
     "decide": {
-        "sweep": Command(
-            f"{_ANALYSES}.sweep:sweep_into_folder",
-            *_STUDIES,
-            first_line="Run a study: many runs, one row each, resumable.",
-        ),
-        "compare": _of_scenario(
-            f"{_ANALYSES}.compare:compare", "Compare configurations, also over an uncertain device."
-        ),
-        "sensitivity": Command(
-            f"{_ANALYSES}.sensitivity:sensitivity",
-            *_STUDIES,
-            first_line="Rank uncertain values by their influence: Sobol or Shapley indices, signed changes.",
-        ),
-        "find": _of_scenario(
-            f"{_ANALYSES}.find:find", "Find the lowest or highest value that meets a condition on a metric."
-        ),
-        "tune": Command(
-            f"{_ANALYSES}.tune:tune",
-            first_line="Tune gains for an objective under constraints, optionally robust.",
-            library="ppafo.analyses.tuning:TUNING",
-        ),
-        "linearise": _of_scenario(
-            f"{_ANALYSES}.linearise.question:linearise",
-            "Make a linear model of the plant near one point, for control design.",
-        ),
-        "design": Command(
-            f"{_ANALYSES}.design.question:design",
-            first_line="Find valve, supply pressure, gains and bottle for a torque profile.",
-            library="ppafo.analyses.design.problem:FILE",
-        ),
-        "bottle": Command(
-            f"{_ANALYSES}.endurance.question:bottle",
-            first_line="Compute how long a bottle of gas lasts, and why it ends.",
-            listing="ppafo.parameters.bottles.bottle:described_bottles",
-            listed="bottle",
-        ),
+        "sweep": Command(f"{_ANALYSES}.sweep:sweep_into_folder", *_STUDIES),
+        "compare": _of_scenario(f"{_ANALYSES}.compare:compare"),
+        "sensitivity": Command(f"{_ANALYSES}.sensitivity:sensitivity", *_STUDIES),
+        "find": _of_scenario(f"{_ANALYSES}.find:find"),
+        "tune": Command(f"{_ANALYSES}.tune:tune", library="ppafo.analyses.tuning:TUNING"),
+        "linearise": _of_scenario(f"{_ANALYSES}.linearise.question:linearise"),
+        "design": Command(f"{_ANALYSES}.design.question:design", library="ppafo.analyses.design.problem:FILE"),
+        "bottle": Command(f"{_ANALYSES}.endurance.question:bottle", library="ppafo.parameters.bottles.bottle:FILE"),
     },
     "walk": {
         "gait": CommandGroup(
@@ -109,7 +71,6 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
         ),
         "walk": Command(
             f"{_ANALYSES}.walk.question:walk_with_and_without",
-            first_line="Simulate walking with the device, without it, and healthy.",
             library="ppafo.walking.loading:FILE",
             default_folder="ppafo.analyses.walk.question:default_folder",
         ),
