@@ -40,35 +40,8 @@ PAPER_BOTTLE = "paper-co2-9oz"
 FILE = TomlKind("bottle", "bottle", resources.files("ppafo.parameters.bottles") / "files", ParameterError)
 _TABLES = resources.files("ppafo.parameters.bottles") / "fluid_tables"
 _SUFFIX = ".json"
-BOTTLE = (
-    Quantity("volume", "m^3", "internal volume of the bottle", minimum=1e-6, maximum=1.0),
-    Quantity("wall_heat_capacity", "J/K", "heat capacity of the bottle's wall", minimum=1e-3, maximum=1e9),
-    Quantity("content_heat_transfer", "W/K", "heat conductance from wall to fluid", minimum=0.0, maximum=1e6),
-    Quantity("room_heat_transfer", "W/K", "heat conductance from the room to the wall", minimum=0.0, maximum=1e6),
-)
-FILL_BY_MASS = (Quantity("gas_mass", "kg", "mass of gas in a full bottle", minimum=0.0, minimum_allowed=False),)
-FILL_BY_PRESSURE = (
-    Quantity("fill_pressure", "Pa_a", "pressure of a full bottle", minimum=1e5, maximum=1e8),
-    Quantity(
-        "fill_temperature", "K", "temperature at which the bottle has that pressure", minimum=200.0, maximum=400.0
-    ),
-)
-FILLS: Forms = {"bottle": tuple(tuple(quantity.name for quantity in form) for form in (FILL_BY_MASS, FILL_BY_PRESSURE))}
+FILLS: Forms = {"bottle": (("gas_mass",), ("fill_pressure", "fill_temperature"))}
 """Alternative forms of a bottle filling: by mass, or by pressure and temperature."""
-REGULATOR = (
-    Quantity("set_pressure", "Pa_a", "outlet pressure of the regulator without flow", minimum=1e5, maximum=2e7),
-    Quantity("droop", "Pa s/kg", "drop of the outlet pressure per mass flow", minimum=0.0, maximum=1e9),
-    Quantity("pressure_margin", "Pa_d", "minimum pressure drop that the regulator needs", minimum=0.0, maximum=1e7),
-    Quantity("area", "m^2", "flow area of the regulator, fully open", minimum=0.0, maximum=1e-3, minimum_allowed=False),
-    Quantity(
-        "discharge_coefficient",
-        "",
-        "discharge coefficient of the regulator",
-        minimum=0.0,
-        maximum=2.0,
-        minimum_allowed=False,
-    ),
-)
 _OPTIONAL = "hose"
 """Optional section of a bottle file."""
 
@@ -84,40 +57,44 @@ def _passage(component: str, short_name: str) -> tuple[Quantity, ...]:
     )
 
 
-BODY = (
-    *_passage("regulator's body", "regulator"),
-    Quantity(
-        "ice_capacity",
-        "kg",
-        "dry ice that closes the regulator's seat",
-        minimum=0.0,
-        maximum=1.0,
-        minimum_allowed=False,
-    ),
-)
-HOSE = _passage("hose to the device", "hose")
-ROOM = (Quantity("temperature", "K", "temperature of the room, and initially of bottle and gas"),)
+def _above_zero(name: str, unit: str, summary: str, maximum: float) -> Quantity:
+    return Quantity(name, unit, summary, minimum=0.0, maximum=maximum, minimum_allowed=False)
+
 
 SECTIONS: dict[str, tuple[Quantity, ...]] = {
-    "bottle": BOTTLE + FILL_BY_MASS + FILL_BY_PRESSURE,
-    "regulator": REGULATOR + BODY,
-    "hose": HOSE,
-    "room": ROOM,
+    "bottle": (
+        Quantity("volume", "m^3", "internal volume of the bottle", minimum=1e-6, maximum=1.0),
+        Quantity("wall_heat_capacity", "J/K", "heat capacity of the bottle's wall", minimum=1e-3, maximum=1e9),
+        Quantity("content_heat_transfer", "W/K", "heat conductance from wall to fluid", minimum=0.0, maximum=1e6),
+        Quantity("room_heat_transfer", "W/K", "heat conductance from the room to the wall", minimum=0.0, maximum=1e6),
+        _above_zero("gas_mass", "kg", "mass of gas in a full bottle", math.inf),
+        Quantity("fill_pressure", "Pa_a", "pressure of a full bottle", minimum=1e5, maximum=1e8),
+        Quantity("fill_temperature", "K", "temperature at which the bottle has that pressure", None, 200.0, 400.0),
+    ),
+    "regulator": (
+        Quantity("set_pressure", "Pa_a", "outlet pressure of the regulator without flow", minimum=1e5, maximum=2e7),
+        Quantity("droop", "Pa s/kg", "drop of the outlet pressure per mass flow", minimum=0.0, maximum=1e9),
+        Quantity("pressure_margin", "Pa_d", "minimum pressure drop that the regulator needs", minimum=0.0, maximum=1e7),
+        _above_zero("area", "m^2", "flow area of the regulator, fully open", 1e-3),
+        _above_zero("discharge_coefficient", "", "discharge coefficient of the regulator", 2.0),
+        *_passage("regulator's body", "regulator"),
+        _above_zero("ice_capacity", "kg", "dry ice that closes the regulator's seat", 1.0),
+    ),
+    "hose": _passage("hose to the device", "hose"),
+    "room": (Quantity("temperature", "K", "temperature of the room, and initially of bottle and gas"),),
 }
 
 PATHS: dict[str, Quantity] = {
     f"{section}.{quantity.name}": quantity for section, members in SECTIONS.items() for quantity in members
 }
 """Declaration of every number of a bottle, by dotted path."""
-REQUIRED = tuple(
-    f"{section}.{quantity.name}"
-    for section, members in (("bottle", BOTTLE), ("regulator", REGULATOR), ("room", ROOM))
-    for quantity in members
+WARMING = (
+    *(f"regulator.{name}" for name in (*Passage._fields, "ice_capacity")),
+    *(f"hose.{name}" for name in Passage._fields),
 )
-"""Paths of numbers without a default, without the filling, which has two forms."""
-
-WARMING = (*(f"regulator.{quantity.name}" for quantity in BODY), *(f"hose.{quantity.name}" for quantity in HOSE))
 """Paths of values for the warming of the gas in regulator and hose; defaults from the paper's bottle."""
+REQUIRED = tuple(path for path in PATHS if path not in WARMING and not other_forms(path, FILLS))
+"""Paths of numbers without a default, without the filling, which has two forms."""
 
 
 def declared(_document: Mapping[str, Any]) -> dict[str, Field]:
@@ -190,7 +167,7 @@ def filled_mass(values: Mapping[str, float], entries: Mapping[str, Entry], fluid
     ``values`` are numbers of a bottle in SI by path, ``entries`` the same as given. Raises ParameterError if none or
     both of the forms are given, or if pressure and temperature do not determine the mass.
     """
-    by_pressure = [f"bottle.{quantity.name}" for quantity in FILL_BY_PRESSURE]
+    by_pressure = ["bottle.fill_pressure", "bottle.fill_temperature"]
     given = [path for path in by_pressure if path in values]
     # Exactly one form: by mass, or by pressure and temperature.
     if ("bottle.gas_mass" in values) == bool(given):
@@ -252,11 +229,6 @@ class Bottle:
 def list_bottles() -> tuple[str, ...]:
     """Return the names of the bundled bottles."""
     return tuple(FILE.names())
-
-
-def described_bottles() -> list[dict[str, Any]]:
-    """Return name and title of each bundled bottle."""
-    return [{"name": name, "title": str(FILE.parse(FILE.read(name), name)["title"])} for name in FILE.names()]
 
 
 def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bottle:
