@@ -7,11 +7,10 @@ import csv
 import math
 import re
 from array import array
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from itertools import chain, islice
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -87,46 +86,44 @@ def read_mapped_text(content: bytes, columns: ColumnMap, map_name: str) -> Mappe
     lines = text_of(content, columns.encoding, remedy='; give encoding = "latin-1" for a Latin-1 file').splitlines()
     if any(map(_SERIAL_MONITOR.match, lines)):
         lines = _with_stamps_as_column(lines, columns)
-    faults, indices = list[PpafoError](), dict[str, int]()
+    faults, indices, of_date = list[PpafoError](), dict[str, int](), list[int]()
     with in_map(map_name):
-        table = _begin(lines, columns)
+        names, first_row, rows = _begun(lines, columns)
+        titles = names or [str(number) for number in range(1, len(first_row) + 1)]
         for name, mapped in columns.channels.items():
             with noted_in(faults):
                 if mapped.column is not None:
-                    indices[name] = _index_of(f"channels.{name}.column", mapped.column, table)
+                    indices[name] = _index_of(f"channels.{name}.column", mapped.column, names, titles)
         raise_noted(faults)
-        date = columns.channels[TIME].date
-        date_index = None if date is None else _index_of(f"channels.{TIME}.date", date, table)
-    time_index = indices.get(TIME)
+        if (date := columns.channels[TIME].date) is not None:
+            of_date = [_index_of(f"channels.{TIME}.date", date, names, titles)]
+    last_index = max((*indices.values(), *of_date), default=0)
     # A first row that is too short is refused with the others, below.
-    is_time_of_day = (
-        time_index is not None and time_index < len(table.first_row) and is_clock(table.first_row[time_index])
-    )
-    numbers = []
-    for name, index in indices.items():
-        mapped = columns.channels[name]
-        words = (_WORDS_OF_DIRECTION if name == _DIRECTION else {}) if mapped.words is None else mapped.words
-        if not (name == TIME and is_time_of_day):
-            numbers.append(_Numbers(name, index, table.title(index), columns.decimal, mapped.thousands, words))
-    clock: list[str] = []
-    dates: list[str] = []
-    last_index = max((*indices.values(), date_index or 0), default=0)
-    stamps = array("q")
+    is_time_of_day = indices.get(TIME, len(first_row)) < len(first_row) and is_clock(first_row[indices[TIME]])
+    of_clock = [indices.pop(TIME)] if is_time_of_day else []
+    of_date = of_date if is_time_of_day else []
+    numbers = [(_NumberColumn(name, titles[index], columns), index, array("d")) for name, index in indices.items()]
+    clock, dates, stamps = list[str](), list[str](), array("q")
     # Row by row, so that no cell of a large file is kept as a text.
-    for line, row in table.rows:
-        _check_width(row, line, table, last_index)
+    for line, row in rows:
+        width = len(row)
+        # Empty cells at the end do not count, and a header may name columns at its end that no row has.
+        while width > len(titles) and not row[width - 1].strip():
+            width -= 1
+        if width != len(titles) and not (width == len(first_row) < len(titles) and last_index < width):
+            raise DataError(
+                f"line {line} has {len(row)} values for {len(titles)} columns; else give delimiter or skip_lines"
+            )
         stamps.append(line)
-        for column in numbers:
-            column.values.append(column.number_in(row[column.index], line))
-        if is_time_of_day and time_index is not None:
-            clock.append(row[time_index])
-            if date_index is not None:
-                dates.append(row[date_index])
+        for column, index, values in numbers:
+            values.append(column.number_in(row[index], line))
+        clock += [row[index] for index in of_clock]
+        dates += [row[index] for index in of_date]
     return MappedTable(
         size=len(stamps),
-        numbers={column.channel: np.array(column.values) for column in numbers},
-        clock=clock if is_time_of_day else None,
-        dates=dates if is_time_of_day and date_index is not None else None,
+        numbers={column.channel: np.array(values) for column, _, values in numbers},
+        clock=clock if of_clock else None,
+        dates=dates if of_date else None,
         rows=stamps,
         noun="line",
         kind=kind_of_comments(line for line in lines if line.startswith(_COMMENT)),
@@ -147,25 +144,13 @@ def _with_stamps_as_column(lines: list[str], columns: ColumnMap) -> list[str]:
     return stamped
 
 
-class _StartedTable(NamedTuple):
-    """Text table at its first row: column names (empty without header), first row of numbers, all rows."""
-
-    names: list[str]
-    first_row: list[str]
-    rows: Rows
-
-    def title(self, index: int) -> str:
-        """Return the name of a column in messages: its header, or its number from 1."""
-        return self.names[index] if self.names else str(index + 1)
-
-
-def _begin(lines: list[str], columns: ColumnMap) -> _StartedTable:
-    """Read the header and first row of a table. Raises DataError if there is no header or no row."""
+def _begun(lines: list[str], columns: ColumnMap) -> tuple[list[str], list[str], Rows]:
+    """Return column names (none without a header), first row, and all rows. Raises DataError if there is no row."""
     rows = _split(lines, columns)
     head = next(rows, None)
     if head is None:
-        skipped = f"after skip_lines = {columns.skip_lines}" if columns.skip_lines else ""
-        raise DataError(f"has no rows {skipped}".rstrip())
+        skipped = f" after skip_lines = {columns.skip_lines}" if columns.skip_lines else ""
+        raise DataError(f"has no rows{skipped}")
     rows = islice(rows if columns.header else chain([head], rows), columns.skip_rows, None)
     first = next(rows, None)
     if first is None:
@@ -175,7 +160,7 @@ def _begin(lines: list[str], columns: ColumnMap) -> _StartedTable:
     # Brackets around several columns, such as 'x [left,right]', are no unit.
     if columns.delimiter in _DELIMITERS and len(first[1]) != len(cells):
         cells = header_cells(cells, _DELIMITERS[columns.delimiter])
-    return _StartedTable([name.strip() for name in cells], first[1], chain([first], rows))
+    return [name.strip() for name in cells], first[1], chain([first], rows)
 
 
 def _split(lines: list[str], columns: ColumnMap) -> Rows:
@@ -192,55 +177,34 @@ def _split(lines: list[str], columns: ColumnMap) -> Rows:
             raise DataError(f"line {number} cannot be read: {error}") from error
 
 
-def _index_of(key: str, column: int | str, table: _StartedTable) -> int:
+def _index_of(key: str, column: int | str, names: list[str], titles: list[str]) -> int:
     """Return the index (from 0) of the column that the map gives at ``key``, by name or number from 1."""
-    names = table.names or [str(number) for number in range(1, len(table.first_row) + 1)]
-    if isinstance(column, int) and column <= len(names):
+    if isinstance(column, int) and column <= len(titles):
         return column - 1
     # A file without header has numbers alone.
-    if table.names and names.count(str(column)) == 1 and isinstance(column, str):
+    if isinstance(column, str) and names.count(column) == 1:
         return names.index(column)
-    hint = "" if column in names else nearest_name(str(column), names)
+    hint = "" if column in titles else nearest_name(str(column), titles)
     raise DataError(
         f"{key} = {column!r}: must be the number of a column of the file, or a name that is not there twice{hint}; "
-        f"available: {shown_names(names)}; if these are no columns, give delimiter, skip_lines or header"
+        f"available: {shown_names(titles)}; if these are no columns, give delimiter, skip_lines or header"
     )
 
 
-def _check_width(row: list[str], line: int, table: _StartedTable, last_index: int) -> None:
-    """Raise DataError for a row with a wrong number of cells; empty cells at the end do not count."""
-    width, first_width = len(row), len(table.first_row)
-    expected = len(table.names) or first_width
-    while width > expected and not row[width - 1].strip():
-        width -= 1
-    # A header may name columns at its end that no row has.
-    if width == expected or (width == first_width and first_width < expected and last_index < width):
-        return
-    raise DataError(f"line {line} has {len(row)} values for {expected} columns; else give delimiter or skip_lines")
+class _NumberColumn:
+    """Column of numbers or known words of a channel, with its title in messages, in the marks of a column map."""
 
-
-@dataclass(frozen=True, slots=True)
-class _Numbers:
-    """Column of numbers while a text table is read.
-
-    ``channel``: name of the channel. ``index``: index of the column. ``title``: its name in messages. ``decimal`` and
-    ``thousands``: marks in its numbers. ``words``: numbers for words. ``values``: numbers read so far.
-    """
-
-    channel: str
-    index: int
-    title: str
-    decimal: str
-    thousands: str | None
-    words: Mapping[str, float]
-    values: "array[float]" = field(default_factory=lambda: array("d"))
+    def __init__(self, channel: str, title: str, columns: ColumnMap) -> None:
+        mapped = columns.channels[channel]
+        self.channel, self.title, self.decimal, self.thousands = channel, title, columns.decimal, mapped.thousands
+        words = (_WORDS_OF_DIRECTION if channel == _DIRECTION else {}) if mapped.words is None else mapped.words
+        self.words, self.values = list(words), {word.lower(): words[word] for word in reversed(words)}
 
     def number_in(self, cell: str, line: int) -> float:
         """Parse the number, or a known word, in a cell. Raises DataError for any other text."""
         text = cell.strip()
-        for word, value in self.words.items():
-            if word.lower() == text.lower():
-                return value
+        if text.lower() in self.values:
+            return self.values[text.lower()]
         at, key = f"line {line}, column {self.title!r}", f"(channels.{self.channel}.column)"
         mark = _MARKS[self.thousands] if self.thousands else ""
         # Marks between groups of digits have to be where they belong: without its mark 1.5 would be 15.
