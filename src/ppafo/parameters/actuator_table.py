@@ -106,8 +106,7 @@ def read_measured_volumes(path: Path) -> MeasuredVolumes:
         columns[name] = column
         step = _step([Decimal(cells[index]) for _, cells in rows])
         digits[name] = abs(to_si(step, unit, declared.unit, 0.0) - to_si(0.0, unit, declared.unit, 0.0))
-    angles = np.unique(columns["angle"])
-    pressures = np.unique(columns["pressure"])
+    angles, pressures = np.unique(columns["angle"]), np.unique(columns["pressure"])
     # Refusals are in the units of the table.
     with shown_in(counted_from({COLUMNS[name].unit: unit for name, unit in units.items()}, 0.0)):
         _check_grid(columns["angle"], columns["pressure"], file)
@@ -175,13 +174,19 @@ def _check_grid(angle: Floats, pressure: Floats, file: str) -> None:
     if pressures[0] <= -STANDARD_ATMOSPHERE:
         raise ParameterError(f"{file}: pressure = {shown_text(pressures[0], 'Pa_a')} is below a perfect vacuum")
     if pressures.size > 1 and 0.0 not in pressures:
-        nearest = pressures[int(np.argmin(np.abs(pressures)))]
+        closest = shown_text(pressures[int(np.argmin(np.abs(pressures)))], "Pa_a")
         raise ParameterError(
             f"{file}: has no volumes of the vented actuator; add lines at {shown_text(0.0, 'Pa_a')} (nearest pressure: "
-            f"{shown_text(nearest, 'Pa_a')})"
+            f"{closest})"
         )
-    _check_spacing("angle", angles, MOST_ANGLES, _NEAREST_ANGLES * float(np.ptp(angles)), file)
-    _check_spacing("pressure", pressures, MOST_PRESSURES, _NEAREST_PRESSURES, file)
+    for name, values, most, nearest in (
+        ("angle", angles, MOST_ANGLES, _NEAREST_ANGLES * float(np.ptp(angles))),
+        ("pressure", pressures, MOST_PRESSURES, _NEAREST_PRESSURES),
+    ):
+        if values.size > most:
+            raise ParameterError(f"{file}: has {values.size} values of {name}; at most {most} are allowed")
+        if values.size > 1 and float(np.diff(values).min()) < nearest:
+            raise ParameterError(f"{file}: two values of {name} are almost equal")
     lines = Counter(zip(angle.tolist(), pressure.tolist(), strict=True))
     repeated = next((pair for pair, count in lines.items() if count > 1), None)
     if repeated is not None:
@@ -189,14 +194,6 @@ def _check_grid(angle: Floats, pressure: Floats, file: str) -> None:
     for pair in product(angles.tolist(), pressures.tolist()):
         if pair not in lines:
             raise ParameterError(f"{file}: there is no line for {_point_text(*pair)}")
-
-
-def _check_spacing(name: str, values: Floats, maximum: int, nearest: float, file: str) -> None:
-    """Raise ParameterError for more than ``maximum`` values in a column, or two values closer than ``nearest`` [SI]."""
-    if values.size > maximum:
-        raise ParameterError(f"{file}: has {values.size} values of {name}; at most {maximum} are allowed")
-    if values.size > 1 and float(np.diff(values).min()) < nearest:
-        raise ParameterError(f"{file}: two values of {name} are almost equal")
 
 
 def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, resolution: float, file: str) -> None:
@@ -251,13 +248,12 @@ def table_of(measured: MeasuredVolumes, file: str) -> Table:
     shares = (angles - angles[0]) / (angles[-1] - angles[0])
     # A bend at each angle but the first two and the last two, so that there are as many coefficients as angles.
     bends = shares[2:-2]
-    first, second = _fitted_chambers(measured)
+    first, *second = fitted_chambers(measured)
     chamber_1 = _chamber(first.volume, measured.pressures, shares)
     _check_curves(chamber_1, bends, angles, "volume_1", file)
-    if second is None:
-        chamber_2 = TabulatedChamber(_NOTHING, tuple(rise._replace(gain=_NOTHING) for rise in chamber_1.rises))
-    else:
-        chamber_2 = _chamber(second.volume[::-1], measured.pressures, shares)
+    chamber_2 = TabulatedChamber(_NOTHING, tuple(rise._replace(gain=_NOTHING) for rise in chamber_1.rises))
+    for fitted in second:
+        chamber_2 = _chamber(fitted.volume[::-1], measured.pressures, shares)
         _check_curves(chamber_2, bends, angles, "volume_2", file)
     return Table(
         first_angle=float(angles[0]),
@@ -282,20 +278,14 @@ class FittedVolumes(NamedTuple):
     torque_error: float
 
 
-def rounding_of_table(path: Path) -> FittedVolumes:
-    """Return the fitted volumes of the chamber of a file in which rounding matters most to the torque."""
-    chambers = (chamber for chamber in _fitted_chambers(read_measured_volumes(path)) if chamber is not None)
-    return max(chambers, key=lambda chamber: (chamber.torque_error, chamber.move))
-
-
-def _fitted_chambers(measured: MeasuredVolumes) -> tuple[FittedVolumes, FittedVolumes | None]:
-    """Return the fitted volumes of both chambers; those of chamber 2 with falling angle, None if there is none."""
+def fitted_chambers(measured: MeasuredVolumes) -> list[FittedVolumes]:
+    """Return the fitted volumes of each chamber; those of chamber 2 with falling angle."""
     shares = (measured.angles - measured.angles[0]) / (measured.angles[-1] - measured.angles[0])
-    first = within_resolution(measured.volume_1, shares, measured.pressures, measured.resolution_1)
-    if measured.volume_2 is None:
-        return first, None
-    turned, falling = 1.0 - shares[::-1], measured.volume_2[::-1]
-    return first, within_resolution(falling, turned, measured.pressures, measured.resolution_2)
+    found = [within_resolution(measured.volume_1, shares, measured.pressures, measured.resolution_1)]
+    if measured.volume_2 is not None:
+        turned, falling = 1.0 - shares[::-1], measured.volume_2[::-1]
+        found.append(within_resolution(falling, turned, measured.pressures, measured.resolution_2))
+    return found
 
 
 def within_resolution(volume: Floats, shares: Floats, pressures: Floats, resolution: float) -> FittedVolumes:

@@ -4,8 +4,8 @@ import itertools
 import math
 import operator
 import re
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, replace
 from functools import partial
 from typing import Any
 
@@ -59,8 +59,6 @@ _NO_LEAK = Orifice(area=0.0, discharge_coefficient=1.0)
 SUPPLIES = PRESSURE_PATH, SECOND_PRESSURE_PATH
 RELATIONS = {"below": operator.lt, "above": operator.gt, "at most": operator.le, "at least": operator.ge}
 """Relation of a number to another one, elementwise over runs, by its words."""
-Reader = Callable[[str, Iterable[Quantity]], dict[str, float]]
-"""Function that reads the declared quantities of a section as numbers [SI] by name."""
 _FLAT_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 
 
@@ -92,24 +90,33 @@ def read_device(parameter_set: ParameterSet, name: str, links: Graph) -> Device:
         completed = parameter_set.completed_by
         remedy = f"use the completed set '{completed}'" if completed else "add them to the file or as overrides"
         raise ParameterError(f"{parameter_set.file}: the device lacks {', '.join(missing)}; {remedy}")
-    read, kind, numbers = _reader(parameter_set), parameter_set.valve_kinds[name], parameter_set.numbers
     species = str(parameter_set.texts[declaration.SPECIES_PATH].value)
     if species not in SPECIES:
         raise ParameterError(
             f"{parameter_set.file}: gas.species = '{one_line(species)}' is unknown{known_names(species, SPECIES)}"
         )
-    named_effects = {path.split(".")[1] for path in numbers if path.startswith(f"{SECTION}.")}
-    supply = read("supply", _present(parameter_set, "supply"))
-    if parameter_set.has_one_chamber:
+    named = {path.split(".")[1] for path in parameter_set.numbers if path.startswith(f"{SECTION}.")}
+    of_effects = {EFFECTS[effect].section: EFFECTS[effect].quantities for effect in sorted(named)}
+    atmosphere, declared = atmospheric_pressure(parameter_set), parameter_set.declarations()
+    sections: dict[str, dict[str, float]] = {}
+    for section, quantities in (needed_quantities(parameter_set, name) | of_effects).items():
+        sections[section] = {}
+        for quantity in quantities:
+            path = f"{section}.{quantity.name}"
+            entry = parameter_set.numbers.get(path)
+            if entry is None and quantity.default is not None:
+                sections[section][quantity.name] = float(quantity.default)
+            elif entry is not None:
+                written = f"{parameter_set.file}: {path} = {entry_text(entry)}"
+                sections[section][quantity.name] = allowed_number(written, entry, declared[path], atmosphere)
+    relieving, has_one_chamber = parameter_set.texts.get(declaration.RELIEVING_PATH), parameter_set.has_one_chamber
+    if has_one_chamber:
         # The port of the second chamber is at the atmosphere and passes nothing.
-        supply["dorsiflexion_pressure"] = supply["atmospheric_pressure"]
-    relieving = parameter_set.texts.get(declaration.RELIEVING_PATH)
-    moves, has_one_chamber = ACTUATORS[parameter_set.actuator_kind], parameter_set.has_one_chamber
-    gas = Gas(species, **read("gas", declaration.GAS))
-    sizes = read("actuator", _present(parameter_set, "actuator"))
+        sections["supply"]["dorsiflexion_pressure"] = sections["supply"]["atmospheric_pressure"]
+    moves, kind, sizes = ACTUATORS[parameter_set.actuator_kind], parameter_set.valve_kinds[name], sections["actuator"]
     return Device(
         name=parameter_set.name,
-        gas=gas,
+        gas=Gas(species, **sections["gas"]),
         actuator=Actuator(
             torque_constant=sizes.get("torque_constant", 0.0),
             displacement_per_radian=sizes.get("displacement_per_radian", 0.0),
@@ -118,26 +125,31 @@ def read_device(parameter_set: ParameterSet, name: str, links: Graph) -> Device:
             dead_volume_1=sizes["dead_volume_1"],
             dead_volume_2=_UNUSED_VOLUME if has_one_chamber else sizes["dead_volume_2"],
             restitution=sizes["restitution"],
-            leak=_NO_LEAK if has_one_chamber else _orifice(parameter_set, read, "actuator.leak"),
+            leak=_NO_LEAK if has_one_chamber else _orifice(sections["actuator.leak"]),
             kind=parameter_set.actuator_kind,
             settings={} if moves.name == VANE else {setting.name: sizes[setting.name] for setting in moves.quantities},
             table=parameter_set.actuator_table,
         ),
-        friction=Friction(**read("friction", declaration.FRICTION)),
-        foot_plate=FootPlate(**read("foot_plate", declaration.FOOT_PLATE)),
-        supply=Supply(**supply, relieving=relieving is not None and relieving.value is True),
+        friction=Friction(**sections["friction"]),
+        foot_plate=FootPlate(**sections["foot_plate"]),
+        supply=Supply(**sections["supply"], relieving=relieving is not None and relieving.value is True),
         valve=Valve(
             kind=kind,
-            settings=read(f"valves.{name}", VALVES[kind].quantities),
-            orifice=_orifice(parameter_set, read, f"valves.{name}"),
+            settings={quantity.name: sections[f"valves.{name}"][quantity.name] for quantity in VALVES[kind].quantities},
+            orifice=_orifice(sections[f"valves.{name}"]),
         ),
-        flow=Flow(**read("flow", declaration.FLOW)),
+        flow=Flow(**sections["flow"]),
         valve_name=name,
         joint=parameter_set.joint,
-        effects={effect: read(EFFECTS[effect].section, EFFECTS[effect].quantities) for effect in sorted(named_effects)},
+        effects={effect: sections[EFFECTS[effect].section] for effect in sorted(named)},
         links=links,
         units=parameter_set.shown,
     )
+
+
+def _orifice(numbers: Mapping[str, float]) -> Orifice | SonicOrifice:
+    form = SonicOrifice if "sonic_conductance" in numbers else Orifice
+    return form(**{item.name: numbers[item.name] for item in fields(form)})
 
 
 def contradictions_of_set(parameter_set: ParameterSet, device: Device) -> Iterator[tuple[tuple[str, ...], str]]:
@@ -211,13 +223,6 @@ def _growth_line(growth: Any, run: int) -> str:
     )
 
 
-def _present(parameter_set: ParameterSet, section: str) -> tuple[Quantity, ...]:
-    """Return the declared quantities of a section, without those of chamber 2 for an actuator with one chamber."""
-    absent = declaration.OF_SECOND_CHAMBER if parameter_set.has_one_chamber else frozenset()
-    members = declaration.members(section, parameter_set.actuator_kind)
-    return tuple(member for member in members if f"{section}.{member.name}" not in absent)
-
-
 def _shape_problem(actuator: Actuator) -> Problem:
     """Return the problem of actuator numbers that contradict each other although each is in range."""
     kind, table = ACTUATORS[actuator.kind], actuator.table
@@ -271,35 +276,6 @@ def _beyond_pressures(device: Device) -> Problem:
     return is_beyond, line
 
 
-def _reader(parameter_set: ParameterSet) -> Reader:
-    """Return a function that reads a section [SI], checks units and ranges, and fills in defaults.
-
-    A number without a default must be present.
-    """
-    declared = parameter_set.declarations()
-    atmosphere = atmospheric_pressure(parameter_set)
-
-    def read(section: str, members: Iterable[Quantity]) -> dict[str, float]:
-        numbers: dict[str, float] = {}
-        for member in members:
-            path = f"{section}.{member.name}"
-            if path not in parameter_set.numbers and member.default is not None:
-                numbers[member.name] = float(member.default)
-                continue
-            entry = parameter_set.numbers[path]
-            written = f"{parameter_set.file}: {path} = {entry_text(entry)}"
-            numbers[member.name] = allowed_number(written, entry, declared[path], atmosphere)
-        return numbers
-
-    return read
-
-
-def _orifice(parameter_set: ParameterSet, read: Reader, section: str) -> Orifice | SonicOrifice:
-    form = orifice_form(parameter_set, section)
-    numbers = read(section, form)
-    return SonicOrifice(**numbers) if form is declaration.SONIC_FORM else Orifice(**numbers)
-
-
 def both_forms(parameter_set: ParameterSet, section: str) -> tuple[str, ...]:
     """Return the names of orifice numbers that mix both forms; empty if they use one form or none."""
     paths = [f"{section}.{name}" for form in FORMS["valve"] for name in sorted(form)]
@@ -317,22 +293,32 @@ def orifice_form(parameter_set: ParameterSet, section: str) -> tuple[Quantity, .
     return declaration.SONIC_FORM if is_sonic else declaration.AREA_FORM
 
 
+def needed_quantities(parameter_set: ParameterSet, valve: str) -> dict[str, tuple[Quantity, ...]]:
+    """Return the quantities of a device with this valve by section, without those of a chamber 2 that it lacks."""
+    sections = {name: declaration.members(name, parameter_set.actuator_kind) for name in _FLAT_SECTIONS}
+    if parameter_set.has_one_chamber:
+        absent = declaration.OF_SECOND_CHAMBER
+        sections = {
+            name: tuple(member for member in members if f"{name}.{member.name}" not in absent)
+            for name, members in sections.items()
+        }
+    else:
+        sections["actuator.leak"] = orifice_form(parameter_set, "actuator.leak")
+    form, kind = orifice_form(parameter_set, f"valves.{valve}"), parameter_set.valve_kinds[valve]
+    return sections | {f"valves.{valve}": form + VALVES[kind].quantities}
+
+
 def missing_values(parameter_set: ParameterSet, valve: str) -> list[str]:
     """Return the paths of values that a device with this valve needs and the set lacks."""
+    # Without numbers of their own, chamber 2 has the pressure of chamber 1, and a vane displaces its torque constant.
+    known = (*parameter_set.numbers, *parameter_set.texts, SECOND_PRESSURE_PATH, DISPLACEMENT_PATH)
     needed = [
-        f"{name}.{member.name}"
-        for name in _FLAT_SECTIONS
-        for member in _present(parameter_set, name)
+        f"{section}.{member.name}"
+        for section, members in needed_quantities(parameter_set, valve).items()
+        for member in members
         if member.default is None
     ]
-    leaks = () if parameter_set.has_one_chamber else ("actuator.leak",)
-    for section in (*leaks, f"valves.{valve}"):
-        needed += [f"{section}.{member.name}" for member in orifice_form(parameter_set, section)]
-    kind = parameter_set.valve_kinds[valve]
-    needed += [f"valves.{valve}.{member.name}" for member in VALVES[kind].quantities if member.default is None]
-    # Without numbers of their own, chamber 2 has the pressure of chamber 1, and a vane displaces its torque constant.
-    missing = [path for path in needed if path not in (*parameter_set.numbers, SECOND_PRESSURE_PATH, DISPLACEMENT_PATH)]
-    return missing + [path for path in (declaration.SPECIES_PATH,) if path not in parameter_set.texts]
+    return [path for path in (*needed, declaration.SPECIES_PATH) if path not in known]
 
 
 def consistency(device: Device) -> Iterator[tuple[str, str, str]]:

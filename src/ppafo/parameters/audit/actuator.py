@@ -191,9 +191,10 @@ def rounded_table(evidence: Evidence) -> Iterator[AuditFinding]:
     path = Path(parameter_set.file).parent / parameter_set.actuator_file
     if parameter_set.actuator_table is None or not path.is_file():
         return
-    from ppafo.parameters.actuator_table import rounding_of_table
+    from ppafo.parameters.actuator_table import fitted_chambers, read_measured_volumes
 
-    rounding = rounding_of_table(path)
+    # Of the chamber in which rounding matters most to the torque.
+    rounding = max(fitted_chambers(read_measured_volumes(path)), key=lambda each: (each.torque_error, each.move))
     if rounding.move > 0.0:
         share = 2.0 * rounding.torque_error
         yield evidence.finding(
