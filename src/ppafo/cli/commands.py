@@ -12,7 +12,7 @@ from ppafo.wording import known_names
 
 _ANALYSES, _VERBS = "ppafo.analyses", "ppafo.cli.verbs"
 _SETS, _GAITS = f"{_VERBS}:sets_list", f"{_VERBS}:gait_list"
-_STUDIES = "ppafo.studies.loading:STUDY_FILES", "ppafo.analyses.study_results:studies_of_the_package"
+_STUDIES = "ppafo.studies.loading:FILE", "ppafo.analyses.study_results:studies_of_the_package"
 
 
 def _of_scenario(verb: str) -> Command:

@@ -4,10 +4,10 @@ import os
 import re
 import shlex
 import tomllib
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from ppafo.arguments import File, Name, Word
 from ppafo.cli.output import CommandOutput, listing
@@ -15,9 +15,10 @@ from ppafo.errors import DataError
 from ppafo.kinds import kind_at
 from ppafo.wording import known_names, one_line
 
+if TYPE_CHECKING:
+    from ppafo.documents.toml_text import TomlKind
+
 _SUFFIX = ".toml"
-_SCHEMAS = {"set": "parameters"}
-"""Names of file kinds in ``ppafo doctor --schema``, if different."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 _NAME_LINE = re.compile(r"""^name *= *(["'])(.*?)\1""", re.MULTILINE)
 _PARENT_LINE = re.compile(r"^parent *=.*\n", re.MULTILINE)
@@ -50,43 +51,36 @@ def example_files(name: str) -> dict[PurePosixPath, bytes]:
     return dict(sorted(files.items()))
 
 
-@dataclass(frozen=True, slots=True)
-class _NewFile:
-    """Kind of input file: noun, folder of bundled files, loader, and command to try next.
+class _NewFile(NamedTuple):
+    """Kind of input file: module of its ``FILE`` and its loader, and command to try next.
 
     In the command, ``FILE`` stands for the new file and ``NAME`` for its name.
     """
 
-    noun: str
-    shipped: str
-    load: str
+    module: str
+    loader: str
     command: str
+
+    @property
+    def library(self) -> "TomlKind":
+        """Kind of TOML file, with the bundled files."""
+        library: TomlKind = kind_at(f"{self.module}:FILE")
+        return library
 
 
 KINDS: dict[str, _NewFile] = {
-    "scenario": _NewFile(
-        "scenario", "scenarios", "ppafo.simulation.loading:load_scenario", "ppafo simulate FILE --out out/NAME"
-    ),
-    "set": _NewFile("parameter set", "parameters/sets", "ppafo.parameters:load_parameter_set", "ppafo sets audit FILE"),
-    "study": _NewFile(
-        "study", "studies/library", "ppafo.studies.loading:load_study", "ppafo sweep FILE --out out/NAME"
-    ),
-    "walk": _NewFile(
-        "walk",
-        "walking/configurations",
-        "ppafo.walking.loading:load_walk",
-        "ppafo walk FILE --minutes 0.2 --out out/NAME",
-    ),
+    "scenario": _NewFile("ppafo.simulation.loading", "load_scenario", "ppafo simulate FILE --out out/NAME"),
+    "set": _NewFile("ppafo.parameters.loading", "load_parameter_set", "ppafo sets audit FILE"),
+    "study": _NewFile("ppafo.studies.loading", "load_study", "ppafo sweep FILE --out out/NAME"),
+    "walk": _NewFile("ppafo.walking.loading", "load_walk", "ppafo walk FILE --minutes 0.2 --out out/NAME"),
     "gait-map": _NewFile(
-        "gait map",
-        "gait/recorded",
-        "ppafo.gait.recorded.mapping:load_map",
+        "ppafo.gait.recorded.mapping",
+        "load_map",
         "ppafo gait import RECORDING --map FILE --body-mass '75 kg' --out out/NAME",
     ),
     "bottle": _NewFile(
-        "bottle",
-        "parameters/bottles/files",
-        "ppafo.parameters.bottles.bottle:load_bottle",
+        "ppafo.parameters.bottles.bottle",
+        "load_bottle",
         "ppafo bottle --bottle FILE --gas-per-stride '0.3 g' --out out/NAME",
     ),
 }
@@ -148,7 +142,7 @@ def new(
         raise DataError(f"--out {path}: the name must end in {_SUFFIX}")
     if os.path.lexists(path):
         raise DataError(f"{path}: already exists; remove it or choose another name")
-    load = kind_at(chosen.load)
+    load = kind_at(f"{chosen.module}:{chosen.loader}")
     write_file(path, _content(kind, source, name, path).encode())
     # A copy that does not load, such as one with a path relative to another folder, is not left.
     try:
@@ -165,25 +159,18 @@ def new(
 
 def list_kinds() -> list[dict[str, str]]:
     """List the kinds of file with their meaning, and the bundled files for ``--from``."""
-    from importlib import resources
-
-    rows = []
-    for kind, new_file in KINDS.items():
-        files = resources.files("ppafo").joinpath(*new_file.shipped.split("/")).iterdir()
-        names = sorted(Path(file.name).stem for file in files if file.name.endswith(_SUFFIX))
-        rows.append({"name": kind, "noun": new_file.noun, "shipped": ", ".join(names)})
+    rows = [
+        {"name": kind, "noun": new_file.library.noun, "shipped": ", ".join(new_file.library.names())}
+        for kind, new_file in KINDS.items()
+    ]
     return [*rows, {"name": EXAMPLE, "noun": "files of a how-to page", "shipped": "see 'ppafo new example'"}]
 
 
 def _content(kind: str, source: str | None, name: str, path: Path) -> str:
     """Return the text of a new file: template or source, under the new name."""
-    from importlib import resources
+    from ppafo.documents.toml_text import value_text
 
-    from ppafo.documents.toml_text import TomlKind, value_text
-
-    templates = resources.files("ppafo.cli") / "templates"
-    shipped = resources.files("ppafo").joinpath(*KINDS[kind].shipped.split("/"))
-    files = TomlKind(KINDS[kind].noun, _SCHEMAS.get(kind, kind), shipped, DataError)
+    templates, files = resources.files("ppafo.cli") / "templates", KINDS[kind].library
     content = (templates / f"{kind}{_SUFFIX}").read_bytes() if source is None else files.read(source)
     files.parse(content, source or f"template of a {kind}")
     text = content.decode("utf-8")

@@ -53,7 +53,7 @@ from ppafo.plugins import Plugins
 from ppafo.units import check_unit
 from ppafo.wording import nearest_name
 
-_FILE = TomlKind("parameter set", "parameters", resources.files("ppafo.parameters") / "sets", ParameterError)
+FILE = TomlKind("parameter set", "parameters", resources.files("ppafo.parameters") / "sets", ParameterError)
 _ORDER = "gas", "actuator", "friction", "foot_plate", "supply", "flow", SECTION, "reported", "valves"
 """Sections with values, in their order."""
 
@@ -65,7 +65,7 @@ def list_sets() -> tuple[str, ...]:
     >>> ppafo.list_sets()
     ('cylinder-lever', 'ppafo2011', 'ppafo2011-printed')
     """
-    return _FILE.names()
+    return FILE.names()
 
 
 @checked
@@ -111,7 +111,7 @@ def load_parameter_set(parameter_set: str | Path, *, plugins: Plugins = ()) -> P
     >>> ppafo.load_parameter_set("ppafo2011").title
     'Portable powered ankle-foot orthosis, completed'
     """
-    content, file = _FILE.read(parameter_set), label(str(parameter_set))
+    content, file = FILE.read(parameter_set), label(str(parameter_set))
     return parse_parameter_set(content, file, Path(parameter_set).parent)
 
 
@@ -127,7 +127,7 @@ def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -
 
     The file of a measured actuator is searched relative to ``folder``. Raises ParameterError if the set is not usable.
     """
-    document = _FILE.parse(content, file)
+    document = FILE.parse(content, file)
     with refused_as(ParameterError, file, KindError):
         fields = declared(document)
     if next(layout_of(fields).faults(document), None):

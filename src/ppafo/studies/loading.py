@@ -55,7 +55,7 @@ from ppafo.wording import first_twice, known_names
 
 _CLOSEST = 1.0 - 1.0e-11
 """Largest coefficient of a correlation matrix that is still positive definite; scores then differ by 5e-6."""
-STUDY_FILES = TomlKind("study", "study", resources.files("ppafo") / "studies" / "library", StudyError)
+FILE = TomlKind("study", "study", resources.files("ppafo") / "studies" / "library", StudyError)
 
 
 def list_studies() -> tuple[str, ...]:
@@ -65,7 +65,7 @@ def list_studies() -> tuple[str, ...]:
     >>> ppafo.list_studies()
     ('gas-of-a-stride', 'pressure-and-area', 'torque-task-uncertainty', 'wearers')
     """
-    return STUDY_FILES.names()
+    return FILE.names()
 
 
 @checked
@@ -97,7 +97,7 @@ def load_study(
     >>> [configuration.name for configuration in study.configurations]
     ['proportional', 'solenoid']
     """
-    return _load(*read_source(STUDY_FILES, study), tuple(overrides), draws, seed)
+    return _load(*read_source(FILE, study), tuple(overrides), draws, seed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +151,7 @@ def drawn_in(
     base = configurations[name]
     if changes and not isinstance(study, Study):
         # The configuration alone, as the others may refuse the changes; without what it does not have.
-        document, source = read_source(STUDY_FILES, study)
+        document, source = read_source(FILE, study)
         document["configurations"] = [table for table in document["configurations"] if table["name"] == name]
         varied = [table for table in document.get("vary", ()) if name in table.pop("only", [name])]
         paths = {table["path"] for table in varied}

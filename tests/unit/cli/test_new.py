@@ -2,7 +2,6 @@
 
 import json
 import re
-from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -13,12 +12,7 @@ from ppafo.cli.new import KINDS
 from ppafo.kinds import kind_at
 from ppafo.parameters.audit import findings_of
 
-SHIPPED = [
-    (kind, Path(item.name).stem)
-    for kind, new in KINDS.items()
-    for item in resources.files("ppafo").joinpath(*new.shipped.split("/")).iterdir()
-    if item.name.endswith(".toml")
-]
+SHIPPED = [(kind, name) for kind, new in KINDS.items() for name in new.library.names()]
 
 
 @pytest.fixture(autouse=True)
@@ -30,7 +24,7 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 def test_every_template_loads_as_it_is_under_its_new_name(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["new", kind, "my-own", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["file"] == "my-own.toml"
-    made = kind_at(KINDS[kind].load)("my-own.toml")
+    made = kind_at(f"{KINDS[kind].module}:{KINDS[kind].loader}")("my-own.toml")
     assert getattr(made, "name", "my-own") == "my-own"
     text = Path("my-own.toml").read_text(encoding="utf-8")
     assert 'name = "template"' not in text
@@ -59,7 +53,7 @@ def test_the_task_of_the_template_is_followed_smoothly_by_the_device_of_the_pape
 def test_every_file_of_the_package_is_copied_under_a_new_name_and_loads(kind: str, source: str) -> None:
     assert main(["new", kind, "my-own", "--from", source]) == 0
     made = Path("my-own.toml").read_text(encoding="utf-8")
-    first = (resources.files("ppafo").joinpath(*KINDS[kind].shipped.split("/")) / f"{source}.toml").read_text("utf-8")
+    first = KINDS[kind].library.read(source).decode()
     if kind == "set":
         assert f'parent = "{source}"' in made.split("\n")
         # Title and notes are of the device that was copied.

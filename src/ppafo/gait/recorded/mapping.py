@@ -20,7 +20,7 @@ from ppafo.parameters.records import SchemaVersion, keyed, read_record, record_s
 from ppafo.units import parse_quantity
 from ppafo.wording import argument_text
 
-_FILE = TomlKind("gait map", "gait-map", resources.files("ppafo.gait.recorded"), DataError)
+FILE = TomlKind("gait map", "gait-map", resources.files("ppafo.gait.recorded"), DataError)
 _Terms = Annotated[tuple[str, ...], Many(Words("", True), "columns to add; '-' before one subtracts it", least=1)]
 _Unit = Annotated[str | None, Words("unit of the columns, where the file does not state it")]
 Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
@@ -216,7 +216,7 @@ def package_map() -> GaitMap:
 
 def load_map(path: str | Path) -> GaitMap:
     """Load a gait map from a TOML file; raises DataError if it cannot be used."""
-    loaded, file = read_record(_FILE, GaitMap, path)
+    loaded, file = read_record(FILE, GaitMap, path)
     wrong = []
     shank, ankle, knee = loaded.shank_angle, loaded.ankle_angle, loaded.knee
     for name, terms, markers in (
