@@ -158,9 +158,8 @@ class Word:
     ``metavar`` is the name in the help. ``read`` converts the text to the value. ``take`` converts a Python value, with
     a ValueError for an unsuitable one, and ``what`` describes the accepted values; without ``take`` the annotated type
     decides. ``option`` is the name of the option if different from the parameter; it also makes an option of a
-    parameter that Python passes by position. ``help`` is the default help text. ``const`` is the value of an option
-    given without a value. ``off`` is the option that clears a flag. ``is_repeated`` marks several values whose type is
-    not just a sequence.
+    parameter that Python passes by position. ``help`` is the default help text. ``off`` is the option that clears a
+    flag. ``is_repeated`` marks several values whose type is not just a sequence.
     """
 
     metavar: str = ""
@@ -169,6 +168,5 @@ class Word:
     what: str = ""
     option: str = ""
     help: str = ""
-    const: Any = None
     off: str = ""
     is_repeated: bool = False

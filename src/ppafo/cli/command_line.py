@@ -251,8 +251,6 @@ def _add_parameter(
     if reading.is_repeated:
         # A list, because argparse cannot append to a tuple, which a verb may have as its default.
         options |= {"action": "append", "default": list(default or ())}
-    if word.const is not None:
-        options |= {"nargs": "?", "const": word.const}
     parser.add_argument(option, **options)
 
 

@@ -10,16 +10,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError
 from ppafo.progress import ProgressLine
 from ppafo.wording import reason
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 EXIT_GOOD = 0
 EXIT_CHECK_FAILED = 1
@@ -60,9 +56,8 @@ def blame_out_option() -> Iterator[None]:
 class CommandOutput:
     """Output of a command: text, JSON document and files.
 
-    ``name`` is the stem of the files in the ``--out`` folder, where ``draw`` makes a figure. ``finish`` draws and
-    writes after the text is printed, and returns the last lines of text. ``aside`` is a line for standard error after
-    the result.
+    ``name`` is the stem of the files in the ``--out`` folder. ``finish`` draws and writes after the text is printed,
+    and returns the last lines of text. ``aside`` is a line for standard error after the result.
     """
 
     text: str
@@ -70,7 +65,6 @@ class CommandOutput:
     name: str = ""
     exit_code: int = EXIT_GOOD
     aside: str = ""
-    draw: "Callable[[], Figure] | None" = None
     finish: Callable[[], str] | None = None
 
 
@@ -80,7 +74,16 @@ def deliver(answer: Any, as_json: bool, out: Path | None, command: str, *, has_w
     ``has_written`` is True for a command that writes its files itself and returns the folder.
     """
     if isinstance(answer, CommandOutput):
-        _deliver_output(answer, as_json, out, command)
+        if out is not None:
+            write_files(out, files_of_output(answer), command)
+        if answer.finish is None or not as_json:
+            print_result(answer.text, answer.document, as_json)
+        if answer.finish is not None:
+            if not as_json:
+                _tell_drawing()
+            print_result(answer.finish(), answer.document, as_json)
+        if answer.aside:
+            print(f"ppafo: {answer.aside}", file=sys.stderr)
         return answer.exit_code
     from ppafo.report.finding import REPORT, text_of
     from ppafo.report.writing import terminal_width
@@ -116,35 +119,10 @@ def deliver(answer: Any, as_json: bool, out: Path | None, command: str, *, has_w
     return EXIT_GOOD if answer.passed else EXIT_CHECK_FAILED
 
 
-def _deliver_output(output: CommandOutput, as_json: bool, out: Path | None, command: str) -> None:
-    if out is not None:
-        write_files(out, files_of_output(output), command)
-    if output.finish is None:
-        print_result(output.text, output.document, as_json)
-    elif as_json:
-        output.finish()
-        print_result("", output.document, as_json)
-    else:
-        print_result(output.text, {}, as_json)
-        _tell_drawing()
-        print_result(output.finish(), {}, as_json)
-    if output.aside:
-        print(f"ppafo: {output.aside}", file=sys.stderr)
-
-
 def files_of_output(output: CommandOutput) -> dict[str, bytes]:
-    """Return text, JSON document and figure of an output as files."""
+    """Return text and JSON document of an output as files."""
     contents = {f"{output.name}.txt": output.text, f"{output.name}.json": json_text(output.document)}
-    files = {file: f"{content}\n".encode() for file, content in contents.items()}
-    if output.draw is None:
-        return files
-    from ppafo.report.drawing import load_drawing
-
-    load_drawing()
-    from ppafo.report.style import render_figure
-
-    figures = render_figure(output.draw(), ("png", "svg"))
-    return files | {f"{output.name}.{file_format}": content for file_format, content in figures.items()}
+    return {file: f"{content}\n".encode() for file, content in contents.items()}
 
 
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")

@@ -4,7 +4,7 @@ import itertools
 import math
 import operator
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import partial
 from typing import Any
@@ -179,15 +179,13 @@ def contradictions(device: Device, stated: ParameterSet | None = None) -> Iterat
     """
     actuator, stops = device.actuator, ("actuator.angle_min", "actuator.angle_max")
     for path, relation, other in consistency(device):
-        paths = tuple(re.sub("^valve[.]", f"valves.{device.valve_name}.", name) for name in (path, other))
-        number, limit = (number_under(device, name.split(".")) for name in (path, other))
-        yield (
-            paths,
-            (
-                np.logical_not(RELATIONS[relation](number, limit)),
-                partial(_rule_line, device, stated, path, relation, other),
-            ),
+        own = tuple(re.sub("^valve[.]", f"valves.{device.valve_name}.", name) for name in (path, other))
+        pair = [number_under(device, name.split(".")) for name in (path, other)]
+        paths = (path, other) if stated is None else own
+        said = partial(
+            _rule_line, device, stated, own[0], pair, f"{paths[0]} = {{}} must be {relation} {paths[1]} = {{}}"
         )
+        yield own, (np.logical_not(RELATIONS[relation](*pair)), said)
     is_misshapen: Any = True
     if np.all(actuator.angle_min < actuator.angle_max):
         is_misshapen, line = _shape_problem(actuator)
@@ -197,30 +195,23 @@ def contradictions(device: Device, stated: ParameterSet | None = None) -> Iterat
     if not np.any(is_misshapen):
         # The growth of a vane is a number of its set, which is above 0.
         growth = actuator.displacement_per_radian if actuator.kind == VANE else shape_and_growth(device)[1]
-        yield ("actuator", *stops), (np.logical_not(growth > 0.0), partial(_growth_line, growth))
+        text = "actuator: chamber 1 must grow with the angle, but changes by {:.4g} m^3/rad at supply pressure"
+        yield ("actuator", *stops), (np.logical_not(growth > 0.0), lambda run: text.format(at(growth, run)))
 
 
-def _rule_line(device: Device, stated: ParameterSet | None, path: str, relation: str, other: str, run: int) -> str:
-    """Return the message on two numbers that break a rule; in the unit of the number at fault, if a set states it."""
-    room, names = at(device.supply.atmospheric_pressure, run), [path, other]
-    own = [re.sub("^valve[.]", f"valves.{device.valve_name}.", name) for name in names]
-    unit = declaration.quantities({device.valve_name: device.valve.kind}, device.actuator.kind)[own[0]].unit
-    number, limit = (at(number_under(device, name.split(".")), run) for name in names)
+def _rule_line(device: Device, stated: ParameterSet | None, path: str, pair: Sequence[Any], rule: str, run: int) -> str:
+    """Return the ``rule`` that two numbers break, with both; in the unit of the first, at ``path``, if a set states it.
+
+    A gauge pressure beside an absolute one would have to be converted.
+    """
+    unit = declaration.quantities({device.valve_name: device.valve.kind}, device.actuator.kind)[path].unit
+    room, (number, limit) = at(device.supply.atmospheric_pressure, run), (at(each, run) for each in pair)
     if stated is None:
-        texts = [shown_text(each, unit, ".9g", room) for each in (number, limit)]
-    else:
-        # A gauge pressure beside an absolute one would have to be converted.
-        names, entry = own, stated.numbers[own[0]]
-        given = entry.unit if declaration.fits(entry.unit, unit) else ""
-        texts = [entry_text(entry), shown_text(limit, unit, atmosphere=room, unit=given)]
-    why = "; both supplies must be on the same side of atmospheric pressure" if stated and path in SUPPLIES else ""
-    return f"{names[0]} = {texts[0]} must be {relation} {names[1]} = {texts[1]}{why}"
-
-
-def _growth_line(growth: Any, run: int) -> str:
-    return (
-        f"actuator: chamber 1 must grow with the angle, but changes by {at(growth, run):.4g} m^3/rad at supply pressure"
-    )
+        return rule.format(*(shown_text(each, unit, ".9g", room) for each in (number, limit)))
+    entry = stated.numbers[path]
+    given = entry.unit if declaration.fits(entry.unit, unit) else ""
+    why = "; both supplies must be on the same side of atmospheric pressure" if path in SUPPLIES else ""
+    return rule.format(entry_text(entry), shown_text(limit, unit, atmosphere=room, unit=given)) + why
 
 
 def _shape_problem(actuator: Actuator) -> Problem:

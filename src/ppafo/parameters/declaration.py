@@ -97,16 +97,12 @@ def is_within(value: Any, quantity: Quantity) -> Any:
     return is_above & (value <= quantity.maximum)
 
 
-def actuator_quantities(kind: str) -> tuple[Quantity, ...]:
-    """Return the quantities of an actuator type, without leak; ``ACTUATOR`` for the vane."""
-    if kind == VANE.name:
-        return ACTUATOR
-    return (*ACTUATORS[kind].quantities, *(quantity for quantity in ACTUATOR if quantity.name not in _OF_A_VANE))
-
-
 def members(section: str, actuator_kind: str) -> tuple[Quantity, ...]:
-    """Return the declared quantities of a section of ``SECTIONS``, for an actuator type."""
-    return actuator_quantities(actuator_kind) if section == "actuator" else SECTIONS[section]
+    """Return the declared quantities of a section of ``SECTIONS``; of an actuator those of its type."""
+    if section != "actuator" or actuator_kind == VANE.name:
+        return SECTIONS[section]
+    shared = (quantity for quantity in ACTUATOR if quantity.name not in _OF_A_VANE)
+    return (*ACTUATORS[actuator_kind].quantities, *shared)
 
 
 def quantities(

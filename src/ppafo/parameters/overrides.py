@@ -220,7 +220,8 @@ def with_overrides(parameter_set: ParameterSet, overrides: Iterable[Override], v
     wrong: list[PpafoError] = []
     for path, text in every.items():
         with noted_in(wrong):
-            parameter_set = _CHANGES.get(path, _with_number)(parameter_set, path, text)
+            change = _with_text if path in (SPECIES_PATH, RELIEVING_PATH) else _with_number
+            parameter_set = change(parameter_set, path, text)
     raise_noted(wrong)
     # A user who gives a pressure in bar reads pressures in bar; a program gives numbers in SI, and reads none.
     typed = {
@@ -271,32 +272,21 @@ def _nearest_value(override: Override, allowed: Sequence[str]) -> str:
     return hint or (f"; '{section}' has {', '.join(near)}" if near else nearest_name(override.typed, allowed))
 
 
-def _with_species(parameter_set: ParameterSet, path: str, override: Override) -> ParameterSet:
-    species = SPECIES.get(override.text)
-    if species is None:
-        raise ParameterError(f"override '{override}': unknown gas{known_names(override.text, SPECIES)}")
-    note = f"follows from the override {path}={override.text}"
-    constants = {"gas.molar_mass": (species.molar_mass, "kg/mol")}
-    constants["gas.heat_capacity_ratio"] = (species.heat_capacity_ratio, "")
-    numbers = {
-        key: Entry(value=value, unit=unit, origin="datasheet", source=species.source, note=note)
-        for key, (value, unit) in constants.items()
-    }
-    chosen = TextEntry(value=override.text, origin="assumed", source=SOURCE, note=_before(parameter_set, path))
-    return replace(
-        parameter_set, numbers={**parameter_set.numbers, **numbers}, texts={**parameter_set.texts, path: chosen}
-    )
-
-
-def _with_relieving(parameter_set: ParameterSet, path: str, override: Override) -> ParameterSet:
-    if override.text not in ("true", "false"):
+def _with_text(parameter_set: ParameterSet, path: str, override: Override) -> ParameterSet:
+    """Return a set with another gas and its constants, or with relieving regulators or not."""
+    numbers, value = dict(parameter_set.numbers), override.text
+    if path == RELIEVING_PATH and value not in ("true", "false"):
         raise ParameterError(f"override '{override}': must be true or false")
-    note, is_true = _before(parameter_set, path), override.text == "true"
-    entry = TextEntry(value=is_true, origin="assumed", source=SOURCE, note=note)
-    return replace(parameter_set, texts={**parameter_set.texts, path: entry})
-
-
-_CHANGES = {SPECIES_PATH: _with_species, RELIEVING_PATH: _with_relieving}
+    if path == SPECIES_PATH:
+        species = SPECIES.get(value)
+        if species is None:
+            raise ParameterError(f"override '{override}': unknown gas{known_names(value, SPECIES)}")
+        note = f"follows from the override {path}={value}"
+        for key, unit in (("molar_mass", "kg/mol"), ("heat_capacity_ratio", "")):
+            numbers[f"gas.{key}"] = Entry(getattr(species, key), unit, "datasheet", species.source, note)
+    note = _before(parameter_set, path)
+    entry = TextEntry(value if path == SPECIES_PATH else value == "true", "assumed", SOURCE, note)
+    return replace(parameter_set, numbers=numbers, texts={**parameter_set.texts, path: entry})
 
 
 def _before(parameter_set: ParameterSet, path: str) -> str:
