@@ -240,39 +240,59 @@ def finer(run: Run) -> Run:
     )
 
 
+def _compared(
+    result: RecordedResult, repeats: Sequence[tuple[str, RecordedResult]]
+) -> tuple[list[NumberCheck], list[NumberCheck], list[float]]:
+    """Metrics and channels of a result with their changes in repeats, by kind, and times [s] at which repeats part."""
+    recording, courses, metrics = result.recording, list[NumberCheck](), list[NumberCheck]()
+    parted = [repeat.status.time for _, repeat in repeats if repeat.status.time is not None]
+    for name, signal in _SIGNALS.items():
+        channels = [channel for channel in signal.channels if channel in recording]
+        if not channels:
+            continue
+        extent = _signal_range(result, signal.unit)
+        allowed, promised = ALLOWED_PARTING * extent, signal.promised_error * extent / MARGIN
+        differences = [(kind, _largest_differences(repeat.recording, recording, channels)) for kind, repeat in repeats]
+        changes = _largest_changes((kind, float(np.max(each))) for kind, each in differences)
+        courses.append(NumberCheck(name, signal.unit, extent, allowed, changes, promised))
+        late = (each > allowed for _, each in differences if np.any(each > allowed))
+        parted += [float(recording.time[np.argmax(each)]) for each in late]
+    for name, unit in {
+        name: each.unit for _, run in (("", result), *repeats) for name, each in run.metrics.items()
+    }.items():
+        value = _value(result, name)
+        changes = _largest_changes((kind, _difference(_value(repeat, name), value)) for kind, repeat in repeats)
+        allowed = ALLOWED_CHANGE * max(abs(value) if math.isfinite(value) else 0.0, _metric_range(result, name, unit))
+        metrics.append(NumberCheck(name, unit, value, allowed, changes, allowed))
+    return metrics, courses, parted
+
+
 def estimated_error(result: RecordedResult, fine: RecordedResult) -> ErrorEstimate:
     """Estimated error of a result, from the same run with finer steps; inf if the finer run diverged.
 
     A smaller tolerance for an error beyond the promised accuracy is not sought here (``with_tolerance``).
     """
-    signals = _recorded_signals(result).values()
-    errors = {signal.unit: math.inf for signal in signals}
-    metric_errors = dict.fromkeys(result.metrics, math.inf)
-    if fine.status.is_completed:
-        for signal in signals:
-            differences = _largest_differences(fine.recording, result.recording, signal.channels)
-            errors[signal.unit] = MARGIN * float(np.max(differences))
-        for name in result.metrics:
-            metric_errors[name] = MARGIN * abs(_difference(_value(fine, name), _value(result, name)))
-    # Relative to the metric's value or, if larger, to the range of its quantity.
-    scales = {
-        name: max(abs(metric.value), _metric_range(result, name, metric.unit))
-        for name, metric in result.metrics.items()
-        if math.isfinite(metric.value)
-    }
-    shares = {name: metric_errors[name] / scale for name, scale in scales.items() if 0.0 < scale < math.inf}
-    worst = max(shares, key=lambda name: shares[name], default="")
-    over_promise = max(
-        errors[signal.unit] / (signal.promised_error * _signal_range(result, signal.unit)) for signal in signals
-    )
+    metrics, courses, _ = _compared(result, [(FINER, fine)])
+
+    def error(row: NumberCheck) -> float:
+        return MARGIN * abs(row.changes[FINER]) if fine.status.is_completed else math.inf
+
+    errors, shares = {row.unit: error(row) for row in courses}, dict[str, float]()
+    known = [row for row in metrics if row.name in result.metrics]
+    for row in (row for row in known if math.isfinite(row.value)):
+        # Relative to the metric's value or, if larger, to the range of its quantity.
+        scale = max(abs(row.value), _metric_range(result, row.name, row.unit))
+        if 0.0 < scale < math.inf:
+            shares[row.name] = error(row) / scale
+    worst = max(shares, key=shares.__getitem__, default="")
     return ErrorEstimate(
         angle=errors["rad"],
         pressure=errors["Pa"],
-        metrics=metric_errors,
+        metrics={row.name: error(row) for row in known},
         temperature=errors.get("K"),
         largest=worst,
         share=shares.get(worst, 0.0),
-        over_promise=over_promise,
+        over_promise=max(error(row) / (_SIGNALS[row.name].promised_error * row.value) for row in courses),
     )
 
 
@@ -295,15 +315,6 @@ def with_tolerance(scenario: Scenario, error: ErrorEstimate, rerun: Rerun) -> Er
         trial, fine = rerun([run, finer(run)])
         over_promise = estimated_error(trial, fine).over_promise if trial.status.is_completed else math.inf
     return replace(error, tolerance=tolerance) if tolerance < scenario.run.tolerance else error
-
-
-def _recorded_signals(result: RecordedResult) -> dict[str, _ComparedSignal]:
-    """Signals that are compared over time, with the channels that are recorded."""
-    recorded = {
-        name: signal._replace(channels=tuple(channel for channel in signal.channels if channel in result.recording))
-        for name, signal in _SIGNALS.items()
-    }
-    return {name: signal for name, signal in recorded.items() if signal.channels}
 
 
 def _signal_range(result: RecordedResult, unit: str) -> float:
@@ -346,29 +357,13 @@ def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
             runs.append((MOVED_MEASUREMENT, replace(run, sensors=changed)))
     results = rerun([planned for _, planned in runs])
     repeats = [(kind, repeat) for (kind, _), repeat in zip(runs, results, strict=True)]
-    courses, metrics = [], []
-    separations = [repeat.status.time for repeat in results if repeat.status.time is not None]
-    for name, signal in _recorded_signals(result).items():
-        extent = _signal_range(result, signal.unit)
-        differences = [_largest_differences(repeat.recording, recording, signal.channels) for repeat in results]
-        by_kind = zip((kind for kind, _ in repeats), differences, strict=True)
-        changes = _largest_changes((kind, float(np.max(each))) for kind, each in by_kind)
-        promised, allowed = signal.promised_error * extent / MARGIN, ALLOWED_PARTING * extent
-        courses.append(NumberCheck(name, signal.unit, extent, allowed, changes, promised))
-        late = (each > allowed for each in differences if np.any(each > allowed))
-        separations += [float(recording.time[np.argmax(each)]) for each in late]
-    units = {name: metric.unit for compared in (result, *results) for name, metric in compared.metrics.items()}
-    for name, unit in units.items():
-        value = _value(result, name)
-        changes = _largest_changes((kind, _difference(_value(repeat, name), value)) for kind, repeat in repeats)
-        scale = max(abs(value) if math.isfinite(value) else 0.0, _metric_range(result, name, unit))
-        metrics.append(NumberCheck(name, unit, value, ALLOWED_CHANGE * scale, changes, ALLOWED_CHANGE * scale))
+    metrics, courses, parted = _compared(result, repeats)
     return Check(
         scenario=scenario.name,
         metrics=tuple(metrics),
         courses=tuple(courses),
         error=with_tolerance(scenario, estimated_error(result, results[0]), rerun),
-        parts_at=min(separations, default=None),
+        parts_at=min(parted, default=None),
         failed=tuple(dict.fromkeys(kind for kind, repeat in repeats if not repeat.status.is_completed)),
     )
 
