@@ -81,13 +81,8 @@ def gains_of(scenario: Scenario) -> Gains | None:
         return None
     loop = loop_of(scenario, law)
     gains = tuple(
-        _Gain(
-            quantity.name,
-            quantity.unit,
-            float(settings[quantity.name]),
-            f"controller.{quantity.name}" in scenario.links,
-        )
-        for quantity in items
+        _Gain(item.name, item.unit, float(settings[item.name]), f"controller.{item.name}" in scenario.links)
+        for item in items
     )
     controlled = scenario.controlled if TORQUE in law.controls else TORQUE
     # A load moves the chambers of a joint that nothing leads, also of one whose torque is controlled.

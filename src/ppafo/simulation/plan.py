@@ -31,7 +31,7 @@ from ppafo.parameters.device import Gas
 from ppafo.parameters.effects import effect_rows, effects_of
 from ppafo.parameters.plant import first_settings, plant_parameters, valve_settings, venting_valve
 from ppafo.simulation.clock import MAXIMUM_STEPS
-from ppafo.simulation.profiles import profile_bounds, profile_parameters
+from ppafo.simulation.profiles import of_profile, profile_bounds, profile_parameters
 from ppafo.simulation.scenario import GasModel, Scenario, vane_motion
 
 WHOLE = 1.0e-9
@@ -234,9 +234,8 @@ def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
     if motion.profile is None:
         angle, rate = motion.angle, motion.angular_velocity
     else:
-        path = PROFILES[motion.profile.kind]
-        numbers = [motion.profile.settings[quantity.name] for quantity in path.quantities]
-        angle, rate, _ = over_runs(lambda *values: path.value(rebuilt(path.parameters, values), 0.0), *numbers)
+        value = PROFILES[motion.profile.kind].value
+        angle, rate, _ = of_profile(lambda numbers: value(numbers, 0.0), motion.profile)
     pressures = scenario.initial.pressure_1, scenario.initial.pressure_2
     model = ACTUATORS[scenario.device.actuator.kind].model
     return state_with_volumes(plant, angle, rate, *volumes_of(model, plant, angle, *pressures), *pressures)

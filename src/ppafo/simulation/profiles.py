@@ -40,11 +40,16 @@ def profile_values(choice: ProfileChoice, times: "np.ndarray[tuple[int], np.dtyp
     return rows
 
 
-def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
-    """Lowest and highest value of a profile [N m or rad, as its levels]; arrays (runs,) if its settings are arrays."""
+def of_profile(function: Callable[[Any], Any], choice: ProfileChoice) -> Any:
+    """Result of a function of a profile's parameters; arrays (runs,) if its settings are arrays."""
     kind = PROFILES[choice.kind]
     numbers = [choice.settings[quantity.name] for quantity in kind.quantities]
-    lowest, highest = over_runs(lambda *values: kind.bounds(rebuilt(kind.parameters, values)), *numbers)
+    return over_runs(lambda *values: function(rebuilt(kind.parameters, values)), *numbers)
+
+
+def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
+    """Lowest and highest value of a profile [N m or rad, as its levels]; arrays (runs,) if its settings are arrays."""
+    lowest, highest = of_profile(PROFILES[choice.kind].bounds, choice)
     return lowest, highest
 
 
@@ -59,9 +64,7 @@ def disordered_knots(choice: ProfileChoice, section: str) -> Problem:
     """Problem of a table with a knot in use that is not later than the one before; of no other profile."""
     if "time_02" not in choice.settings:
         return False, lambda _run: ""
-    kind = PROFILES[choice.kind]
-    numbers = [choice.settings[quantity.name] for quantity in kind.quantities]
-    disordered = over_runs(lambda *values: disordered_knot(rebuilt(kind.parameters, values)), *numbers)
+    disordered = of_profile(disordered_knot, choice)
 
     def line(run: int) -> str:
         number = round(at(disordered, run))

@@ -95,7 +95,7 @@ class SampledRun:
             angle, pressure_1, pressure_2 = self._shown_signals(effect_states, angle, *pressures)
         if program.ideal_sensors:
             torque = program.actuator.torque(self._plant, angle, pressure_1, pressure_2)
-            return Measurement(angle=angle, pressure_1=pressure_1, pressure_2=pressure_2, torque=torque)
+            return Measurement(angle, pressure_1, pressure_2, torque)
         return measure(self._sensors, angle, pressure_1, pressure_2, self._plant, self.sample, parts=program.functions)
 
     @property
@@ -131,36 +131,17 @@ class SampledRun:
 
     def _walk_measurement(self) -> GaitMeasurement:
         """Measurement of a walking controller, of the present state."""
-        program, state = self._batch.program, self._block.states[:, 0].tolist()
-        angle, mass_1, mass_2, heel_force, toe_force = (
-            state[self._rows[path]]
-            for path in ("state.angle", "state.mass_1", "state.mass_2", "walk.heel_force", "walk.toe_force")
-        )
-        pressures = program.actuator.pressures(self._plant, angle, mass_1, mass_2)
+        program, plant, state = self._batch.program, self._plant, self._block.states[:, 0].tolist()
+        paths = "state.angle", "state.mass_1", "state.mass_2", "walk.heel_force", "walk.toe_force"
+        angle, mass_1, mass_2, heel, toe = (state[self._rows[path]] for path in paths)
+        pressures = program.actuator.pressures(plant, angle, mass_1, mass_2)
         if program.ideal_sensors:
-            torque = program.actuator.torque(self._plant, angle, *pressures)
-            pressure_1, pressure_2 = pressures
-            return GaitMeasurement(
-                angle=angle,
-                pressure_1=pressure_1,
-                pressure_2=pressure_2,
-                torque=torque,
-                heel_force=heel_force,
-                toe_force=toe_force,
-            )
-        measurement, self._last_measurement = measure_gait(
-            self._sensors,
-            self._gait_sensors,
-            self._last_measurement,
-            angle,
-            *pressures,
-            heel_force,
-            toe_force,
-            self._plant,
-            self.sample,
-            parts=program.functions,
+            return GaitMeasurement(angle, *pressures, program.actuator.torque(plant, angle, *pressures), heel, toe)
+        sensors, sample = (self._sensors, self._gait_sensors, self._last_measurement), self.sample
+        found, self._last_measurement = measure_gait(
+            *sensors, angle, *pressures, heel, toe, plant, sample, parts=program.functions
         )
-        return measurement
+        return found
 
 
 def _parameter_group(batch: Batch, name: str) -> Any:

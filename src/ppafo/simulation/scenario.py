@@ -262,16 +262,9 @@ class SupplyLine:
         """Return the lines as engine parameters; their regulators relieve if those of the supply do."""
         from ppafo.model.regulator import SupplyLines
 
-        first, second = self.plantarflexion, self.dorsiflexion
-        return SupplyLines(
-            droop_1=first.droop,
-            largest_flow_1=first.largest_flow,
-            volume_1=first.volume,
-            droop_2=second.droop,
-            largest_flow_2=second.largest_flow,
-            volume_2=second.volume,
-            relieving=float(supply.relieving),
-        )
+        lines = self.plantarflexion, self.dorsiflexion
+        first, second = ((line.droop, line.largest_flow, line.volume) for line in lines)
+        return SupplyLines(*first, *second, float(supply.relieving))
 
 
 @dataclass(frozen=True, slots=True)
