@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_to
 from ppafo.errors import SimulationError
 from ppafo.signals.recording import Recording
 from ppafo.simulation.at_hand import RecordedResult, in_own_units
+from ppafo.simulation.motion_kind import Measured
 from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario, scenario_document
@@ -49,25 +50,18 @@ class Status:
         return self.kind == "completed"
 
 
-class RunMetrics(NamedTuple):
-    """Channels of a run, and metrics by name."""
-
-    recording: Recording
-    metrics: "Mapping[str, Metric]"
-
-
 class DeferredResult:
     """Recording and metrics of a run, computed on first use."""
 
     __slots__ = ("_measured",)
 
-    def __init__(self, measured: RunMetrics | Callable[[], RunMetrics]) -> None:
+    def __init__(self, measured: Measured | Callable[[], Measured]) -> None:
         self._measured = measured
 
-    def __call__(self) -> RunMetrics:
+    def __call__(self) -> Measured:
         """Return recording and metrics; the same objects at every call."""
         # The function that makes them holds all rows of the run, so it is let go once they are made.
-        if not isinstance(self._measured, RunMetrics):
+        if not isinstance(self._measured, tuple):
             self._measured = self._measured()
         return self._measured
 
@@ -76,7 +70,7 @@ class DeferredResult:
 
     __hash__ = None  # type: ignore[assignment]  # recordings have no hash
 
-    def __reduce__(self) -> tuple[type["DeferredResult"], tuple[RunMetrics]]:
+    def __reduce__(self) -> tuple[type["DeferredResult"], tuple[Measured]]:
         """Copy and pickle the recording and metrics only: the program of the run stays in this process."""
         return DeferredResult, (self(),)
 
@@ -98,12 +92,12 @@ class Result(RecordedResult):
     @property
     def recording(self) -> Recording:
         """Channels over time, in SI."""
-        return self.measured().recording
+        return self.measured()[0]
 
     @property
     def metrics(self) -> "Mapping[str, Metric]":
         """Metrics by name, in SI."""
-        return self.measured().metrics
+        return self.measured()[1]
 
     @property
     def tracking(self) -> "Tracking":
@@ -240,17 +234,15 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     status, times = end_of(run, outcome)
     versions = {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__}
     engine = {"step": run.step, "steps": run.step_count, "steps_per_sample": run.steps_per_sample}
-    measure = partial(_measured, scenario, run, times, outcome.record)
-    return Result(scenario, status, versions, engine, DeferredResult(measure))
 
+    def measured() -> Measured:
+        from ppafo.metrics.metric import Metrics
 
-def _measured(scenario: Scenario, run: Run, times: Floats, record: Floats) -> RunMetrics:
-    """Recording and metrics of a run, from its record (samples, rows, 1) at times [s]."""
-    from ppafo.metrics.metric import Metrics
+        rows = rows_by_path(run, outcome.record[: times.size])
+        recording, metrics = scenario.motion.motion_kind.measured(scenario, run, times, rows)
+        return recording, Metrics(metrics)
 
-    kind = scenario.motion.motion_kind
-    recording, metrics = kind.measured(scenario, run, times, rows_by_path(run, record[: times.size]))
-    return RunMetrics(recording, Metrics(metrics))
+    return Result(scenario, status, versions, engine, DeferredResult(measured))
 
 
 def rows_by_path(run: Run, record: Floats) -> dict[str, Floats]:

@@ -15,7 +15,7 @@ from ppafo.documents.json_text import plain
 from ppafo.metrics import Metric
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.scenario import Scenario, scenario_document
-from ppafo.simulation.simulate import DeferredResult, Result, RunMetrics, Status
+from ppafo.simulation.simulate import DeferredResult, Result, Status
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def result(step_response: Scenario) -> Result:
     channels = {"angle": Channel(np.array([0.3, 0.4]), "rad"), "pressure_1": Channel(np.array([1e5, 2e5]), "Pa")}
     recording = Recording("step-response", np.array([0.0, 0.1]), channels, kind="simulated")
     metrics = {"angle_range": Metric(0.1, "rad", "range"), "broken": Metric(float("inf"), "N m", "no number")}
-    measured = DeferredResult(RunMetrics(recording, metrics))
+    measured = DeferredResult((recording, metrics))
     return Result(step_response, Status("completed"), {"ppafo": "0"}, {"step": 1e-3, "steps": 100}, measured)
 
 
