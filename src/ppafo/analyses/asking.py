@@ -8,9 +8,8 @@ from ppafo.parameters.overrides import over
 from ppafo.parameters.parameter_set import PATHS_THAT_SET_UNITS, units_of_texts
 from ppafo.remedy_trials import verdict_of
 from ppafo.report.finding import Column, Finding, Section, columns_of
-from ppafo.report.kind import TIME, ConfidenceInterval, Kind, of_metric, of_path
+from ppafo.report.kind import TIME, ConfidenceInterval, Kind, label_of, of_metric, of_path
 from ppafo.report.panels import Mark, Panel, dots
-from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLACK, BLUE, COLOURS, GREEN, GREY, MARKERS, ORANGE, PURPLE, VERMILION, look_of_valve
 from ppafo.running import simulate
 from ppafo.simulation.declaration import changes_reach

@@ -34,8 +34,7 @@ from ppafo.loading import load_scenario
 from ppafo.model.controlled import CONTROLLED
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.plugins import Plugins
-from ppafo.report.kind import metric_quantity, metric_words
-from ppafo.report.setting_names import label_of
+from ppafo.report.kind import label_of, metric_quantity, metric_words
 from ppafo.running import simulate
 from ppafo.signals.recording import Recording
 from ppafo.simulation.scenario import Scenario

@@ -2,8 +2,11 @@
 
 import math
 import re
+import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
+from importlib.resources import files
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +14,6 @@ from numpy.typing import ArrayLike
 from ppafo.errors import ArgumentError
 from ppafo.metrics import METRICS, Metric
 from ppafo.parameters.graph import fixed_zero
-from ppafo.report.setting_names import label_of
 from ppafo.signals.recording import Floats
 from ppafo.units.shown import QUANTITIES, quantity_of_unit, shown_value, unit_of
 from ppafo.wording import known_names, without_exponent
@@ -22,6 +24,9 @@ _ON_AXES = {"psi_g": "psig", "psi_a": "psia", "mm^2": "mm$^2$", "cm^3": "cm$^3$"
 """Forms of display units on the axes of figures, where these differ from the form in tables."""
 _PRESSURE_KINDS = {"_g": " gauge", "_a": " absolute"}
 """Words for the suffixes of pressure units on the axes of figures."""
+_PREFIXES = {"sensors": "Sensors: ", "supply_line": "Line: "}
+REFERENCE_LEVELS = {"reference.level": "to hold", "reference.start_level": "before the ramp"}
+"""Labels of reference settings after the name of the controlled quantity, as in "Torque before the ramp"."""
 _METRIC = ".4g"
 """Number format of a metric."""
 _FORM = re.compile(r"[-+]?\d*(\.\d+)?[efgd]")
@@ -174,6 +179,25 @@ def of_metric(name: str, form: str = ".4g") -> Kind:
 def of_stored_metric(name: str, unit: str, form: str = ".4g") -> Kind:
     """Return the kind of a stored metric from its name and SI unit, also for a metric that is no longer defined."""
     return Kind(metric_words(name), unit, metric_quantity(unit), form)
+
+
+@cache
+def setting_names() -> dict[str, str]:
+    """Return the display names of settings by path; most settings have none."""
+    return tomllib.loads(files("ppafo.report").joinpath("setting_names.toml").read_text(encoding="utf-8"))
+
+
+def label_of(path: str, controlled: str = "torque") -> str:
+    """Return the display name of a setting; the default is the last part of its path.
+
+    ``controlled`` names the quantity that a reference prescribes, in words.
+    """
+    if path in REFERENCE_LEVELS:
+        return f"{controlled[:1].upper()}{controlled[1:]} {REFERENCE_LEVELS[path]}"
+    group, _, name = path.rpartition(".")
+    said = name.replace("_", " ")
+    prefix = _PREFIXES.get(group.partition(".")[0], "")
+    return setting_names().get(path, f"{prefix}{said}" if prefix else said[:1].upper() + said[1:])
 
 
 def of_path(path: str, unit: str, form: str = ".6g", given: str = "") -> Kind:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from ppafo.report.setting_names import label_of
+from ppafo.report.kind import label_of
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,9 @@ from ppafo.errors import DataError
 from ppafo.parameters import load_device
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.recorded.channels import regular_interval, sample_period
+from ppafo.simulation.recorded.channels import between_stops, regular_interval, sample_period
 from ppafo.simulation.recorded.inputs import (
     RecordedInputs,
-    between_stops,
     step_inputs,
     supply_paths,
     with_highest_supply,

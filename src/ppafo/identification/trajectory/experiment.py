@@ -32,16 +32,16 @@ from ppafo.simulation.recorded.channels import (
     DORSIFLEXION_SUPPLY,
     EXTERNAL_TORQUE,
     SUPPLY,
+    between_stops,
     check_absolute,
     check_command,
     check_gaps,
     regular_interval,
     sample_period,
 )
-from ppafo.simulation.recorded.inputs import between_stops, supply_paths, with_highest_supply
-from ppafo.simulation.recorded.motion import motion_at, read_error
+from ppafo.simulation.recorded.inputs import supply_paths, with_highest_supply
 from ppafo.simulation.recorded.replay import replay_scenario, with_fixed_volume
-from ppafo.simulation.recorded.rest import start_of, value_at_rest
+from ppafo.simulation.recorded.rest import motion_at, read_error, start_of, value_at_rest
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.simulation.scenario import (
     PYTHON_CONTROLLER,

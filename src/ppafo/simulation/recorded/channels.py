@@ -3,6 +3,7 @@
 import numpy as np
 
 from ppafo.errors import DataError
+from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.signals.faults import longest_gap
 from ppafo.signals.recording import Floats
@@ -26,6 +27,8 @@ _IRREGULARITY = 0.02
 """Largest deviation of a time from a regular grid, as a fraction of the interval; clocks write rounded times."""
 _COMMAND_TOLERANCE = 1.0e-6
 """Command [-] beyond full opening that counts as rounding in a file."""
+_BEYOND_STOPS = 0.05
+"""Largest excess of a measured angle over a stop, as a fraction of the range; it is then limited to the stop."""
 _SMALLEST_ABSOLUTE = 0.3
 """Fraction of atmospheric pressure [-] below which a pressure is almost surely a mislabelled gauge pressure."""
 
@@ -71,3 +74,22 @@ def sample_period(time: Floats) -> float:
     """Return the sample interval [s], or the interval of the grid to which irregular samples are assigned."""
     shortest = min(max(float(np.diff(time).min()), SHORTEST_SAMPLE), LONGEST_STEP)
     return regular_interval(time) or shortest
+
+
+def between_stops(angles: Floats, device: Device, file: str) -> Floats:
+    """Return angles [rad], limited to the stops; DataError, prefixed with ``file``, for angles far beyond a stop."""
+    lowest, highest = device.actuator.angle_min, device.actuator.angle_max
+    margin = _BEYOND_STOPS * (highest - lowest)
+    worst = angles[int(np.argmax(np.maximum(lowest - angles, angles - highest)))]
+    if not lowest - margin <= worst <= highest + margin:
+        shown, low, high = np.degrees([worst, lowest, highest])
+        is_negative = lowest - margin <= float(-angles.max()) and float(-angles.min()) <= highest + margin
+        hint = (
+            "; with the opposite sign all angles would lie between the stops"
+            if is_negative
+            else "; if the angle has another zero, give sign and offset in a column map"
+        )
+        raise DataError(
+            f"{file}: 'angle' is {shown:.4g} deg, beyond the stops of {device.name}, {low:g} to {high:g} deg{hint}"
+        )
+    return np.clip(angles, lowest, highest)

@@ -7,7 +7,6 @@ import numpy as np
 
 from ppafo.engine.replay import RECORDED_ANGLE, AngleSegment, StepInputs
 from ppafo.engine.run import Run
-from ppafo.errors import DataError
 from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats, between_samples
@@ -18,13 +17,12 @@ from ppafo.simulation.recorded.channels import (
     EXTERNAL_TORQUE,
     LONGEST_STEP,
     SUPPLY,
+    between_stops,
 )
-from ppafo.simulation.recorded.motion import motion_at
+from ppafo.simulation.recorded.rest import motion_at
 
 _HISTORY = 0.25
 """Time before the start for which a valve follows the recorded commands [s], longer than any dead time."""
-_BEYOND_STOPS = 0.05
-"""Largest excess of a measured angle over a stop, as a fraction of the range; it is then limited to the stop."""
 _SUPPLY_PATH, _DORSIFLEXION_PATH = "plant.supply_pressure", "plant.dorsiflexion_pressure"
 
 
@@ -116,22 +114,3 @@ def with_prescribed_angle(run: Run, angle: float) -> Run:
     """Return the run with its vane moved along a recorded angle, which is ``angle`` [rad] at the start."""
     program = replace(run.program, angle=RECORDED_ANGLE)
     return replace(run, program=program, path=AngleSegment(0.0, angle, 0.0), needs_parts=True)
-
-
-def between_stops(angles: Floats, device: Device, file: str) -> Floats:
-    """Return angles [rad], limited to the stops; DataError, prefixed with ``file``, for angles far beyond a stop."""
-    lowest, highest = device.actuator.angle_min, device.actuator.angle_max
-    margin = _BEYOND_STOPS * (highest - lowest)
-    worst = angles[int(np.argmax(np.maximum(lowest - angles, angles - highest)))]
-    if not lowest - margin <= worst <= highest + margin:
-        shown, low, high = np.degrees([worst, lowest, highest])
-        is_negative = lowest - margin <= float(-angles.max()) and float(-angles.min()) <= highest + margin
-        hint = (
-            "; with the opposite sign all angles would lie between the stops"
-            if is_negative
-            else "; if the angle has another zero, give sign and offset in a column map"
-        )
-        raise DataError(
-            f"{file}: 'angle' is {shown:.4g} deg, beyond the stops of {device.name}, {low:g} to {high:g} deg{hint}"
-        )
-    return np.clip(angles, lowest, highest)
