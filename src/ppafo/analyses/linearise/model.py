@@ -4,11 +4,12 @@ Read downwards: ``linear_model`` takes a point of a run or the steady state, and
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.util import find_spec
 from numbers import Real
-from typing import TYPE_CHECKING, Any, NamedTuple
+from operator import methodcaller
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from ppafo.control.controllers import switching
 from ppafo.control.profiles import CONSTANT
 from ppafo.control.torque_loop import SHARPNESS
+from ppafo.documents.json_text import plain
 from ppafo.engine.continuous_time import free_motion, gas_rates, mode_at_rest, torque_at_rest
 from ppafo.engine.in_python import PythonFunctions, functions_of, in_program
 from ppafo.engine.lanes import Floats, run_batch
@@ -30,7 +32,7 @@ from ppafo.model.ports import at_valve, friction_at_rest, sent_command
 from ppafo.model.valves.proportional import NO_SLEW_LIMIT
 from ppafo.report.finding import Finding, Section, columns_of, facts
 from ppafo.report.kind import TIME, Kind, of_path
-from ppafo.report.panels import Mark, Panel
+from ppafo.report.panels import Mark, Panel, dots
 from ppafo.report.style import BLACK, BLUE, GREY, VERMILION
 from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.numbers import changes_in
@@ -44,87 +46,39 @@ from ppafo.units.shown import in_units, quantity_of_unit
 from ppafo.version import __version__
 from ppafo.wording import argument_text, known_names, one_line
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 EQUILIBRIUM = "equilibrium"
-DEAF = "a small change of the command has no effect (dead band, slew limit, saturation): the column of the command is 0"
-MISSING_CONTROL = "a system for python-control needs the package control: pip install ppafo[control]"
 VALVE = "valve_"
 """Prefix of the names of valve states."""
 _OPENINGS = (f"{VALVE}requested", f"{VALVE}opening")
 _SUPPLIES, _MOTION = ("supply_pressure", "dorsiflexion_pressure"), ("angle", "angular_velocity")
-_DRIVEN = (*_SUPPLIES, "external_torque")
-"""Inputs of a linear model that are fields of ``PlantParameters``."""
+_PRESSURES, _TEMPERATURES = ("pressure_1", "pressure_2"), ("temperature_1", "temperature_2")
 UNITS = {
     "angle": "rad",
     "angular_velocity": "rad/s",
-    **dict.fromkeys(("pressure_1", "pressure_2", *_SUPPLIES), "Pa"),
-    **dict.fromkeys(("temperature_1", "temperature_2"), "K"),
-    **dict.fromkeys((*_OPENINGS, "command"), "1"),
+    **dict.fromkeys((*_PRESSURES, *_SUPPLIES), "Pa"),
+    **dict.fromkeys(_TEMPERATURES, "K"),
     f"{VALVE}rate": "1/s",
     **dict.fromkeys(("external_torque", "torque"), "N m"),
     **dict.fromkeys(("supplied_flow", "vented_flow"), "kg/s"),
 }
-"""SI units of all signals of a linear model."""
+"""SI units of the signals of a linear model; others are dimensionless."""
 _SIGNALS = ("states", "inputs", "outputs")
 _SIZES = {"Pa": 1.0e5, "K": 300.0}
-"""Reference size for values with a unit [SI]; 1 for any other unit."""
-_SINGULAR = 1.0e13
-"""Condition number of a scaled matrix above which its solution has no correct digit (64-bit floats: 1e16)."""
-_ON_THE_EDGE = 1.0e-6
-"""Difference of the slopes on both sides, divided by the largest slope of the row, above which there is a kink.
-
-Without a kink, the finite differences agree to about 1e-9.
-"""
-_ZERO = 1.0e-9
-"""Slope divided by the largest slope of its row, below which the slope counts as 0 (rounding)."""
+"""Reference size of values by unit [SI], else 1: for steps of differences, and to compare slopes and rates."""
+_ON_THE_EDGE, _ZERO = 1.0e-6, 1.0e-9
+"""Slope over the largest of its row: above the first, a difference of both sides is a kink (of the smooth, about 1e-9);
+below the second, a slope is 0."""
 _LONGEST, _SHORTER, _LENGTHS, _ORDERS = 1.0e-2, 4.0, 8, 5
 """Longest step of a difference over the reference size, ratio of steps, their number, and orders extrapolated [-]."""
 _STEADY = 1.0e-9
 """Largest time derivative divided by the size of the state [1/s] that counts as zero."""
-_FIRST_COMMANDS = (0.01, 0.1, 0.003, 0.03, 0.3, 1.0)
-"""Magnitudes of the command [-] from which the search for the steady state starts."""
-_TRIED_COMMANDS = tuple(np.linspace(-0.95, 0.95, 20).tolist())
-"""Commands [-] at which a proportional valve moves; a table of openings may be flat at some of them."""
 PID_LAWS = ("pid", "pid_feedforward")
 """Controllers whose feedback is a PID: their loop is linear while the command is not clipped."""
-_POINTS, _POINTS_BELOW = 20_000, 2_000
-"""Number of frequencies of a loop, on a logarithmic scale, and of those added below for a loop with an integrator."""
-_BELOW_POLES = 1.0e-3
-"""Lowest frequency of a loop, relative to the frequency of the slowest pole or corner that is no integrator [-]."""
-_LEAST_START = 1.0e3
-"""Least magnitude [-] at the lowest frequency of a loop with an integrator: there the integrator decides."""
-_INTEGRATOR = 1.0e-9
+_INTEGRATOR = 1.0e-6
 """Magnitude [1/s] up to which a pole counts as an integrator."""
-_ROUNDING = 1.0e-9
-"""Tolerance for the rounding of a delay in sample periods [-]."""
-DURATION, INTERVAL = 1.0, 1.0e-3
-"""Duration of a run after a step of the command, and sample time of its output [s]."""
-SHARES = tuple(np.geomspace(3.0e-4, 0.3, 13).tolist())
-"""Step heights of the command divided by the steady command [-]: three decades."""
-_DRAWN_STEPS = (-5, -1)
-"""Indices of the steps plotted over time: the middle of the three decades, and the largest step."""
-_FULL = 0.99
-"""Ratio of gauge pressures, chamber to supply, above which the chamber counts as full [-]."""
-_LARGEST_COMMAND = 0.7
-"""Steady command [-] above which the largest step comes too close to full opening, which is 1."""
-_REAL = 1.0e-6
-"""Imaginary part of a pole divided by its magnitude, up to which the pole counts as real."""
-_DRAWN_POINTS, _LOWEST_SHARE, _HIGHEST = 400, 0.1, 100.0
-"""Frequencies of the plot: their number, the lowest over the lowest reported one [-], and the highest [Hz]."""
-_LOOP_POINTS = slice(None, None, -20)
-"""Points of the open loop that are plotted: every twentieth, counted back from the last."""
-_FREQUENCY, _DASHED = Kind("Frequency", "Hz"), {"linestyle": "--"}
-_FREQUENCY_CAPTION = (
-    "Open loop, if it has margins: each margin extends from its dot to the dashed line. Torque for a small sinusoidal "
-    "command; dashed: with the dead time, the age of the measurements and half a sample period, which the model does "
-    "not include."
-)
-_STEPS_CAPTION = (
-    "Steps of the command from the steady state, simulated and by the linear model; their difference grows with the "
-    "square of the amplitude."
-)
+_INTERVAL, _SHARES = 1.0e-3, tuple(np.geomspace(3.0e-4, 0.3, 13).tolist())
+"""Sample time [s] of runs after a step of the command, and the steps divided by the steady command: three decades."""
+_DASHED = {"linestyle": "--"}
 
 
 class OmittedDelays(NamedTuple):
@@ -135,19 +89,20 @@ class OmittedDelays(NamedTuple):
     period: float
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, slots=True)
 class LoopMargins:
     """Margins of the control loop, closed by the scenario's PID; None where a crossover does not exist.
 
     Angles are in rad and frequencies in Hz, as in JSON; the report has degrees.
 
-    ``is_stable``: True if the closed loop of the linear model is stable (Nyquist criterion)
+    ``is_stable``: True if the closed loop of the linear model is stable
     ``gain_margin``: factor on all gains at which the loop becomes unstable [-]
     ``phase_crossover``: frequency of the gain margin [Hz]
     ``phase_margin``: phase margin [rad]
     ``gain_crossover``: frequency of the phase margin, at which the loop gain is 1 [Hz]
     ``bandwidth``: lowest frequency at which the closed loop follows with 0.707 of its lowest-frequency response [Hz]
     ``peak_sensitivity``: largest sensitivity abs(1 / (1 + L)) [-]
+    ``frequencies``, ``loop``: frequencies [Hz] up to half the sample rate, and the open loop L at each; not in JSON
     """
 
     is_stable: bool
@@ -157,16 +112,8 @@ class LoopMargins:
     gain_crossover: float | None
     bandwidth: float | None
     peak_sensitivity: float
-
-    def __repr__(self) -> str:
-        """Return the margins with the units of their attributes; the phase margin in degrees too, as in the report."""
-        units = dict.fromkeys(("phase_crossover", "gain_crossover", "bandwidth"), " Hz")
-        units["phase_margin"] = f" rad ({np.degrees(self.phase_margin or 0.0):.3g} deg)"
-        values = asdict(self).items()
-        texts = (
-            f"{value:.4g}{units.get(key, '')}" if isinstance(value, float) else f"{value}" for key, value in values
-        )
-        return f"LoopMargins({', '.join(f'{name}={text}' for (name, _), text in zip(values, texts, strict=True))})"
+    frequencies: Floats = field(compare=False, repr=False)
+    loop: NDArray[np.complex128] = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -181,7 +128,6 @@ class LinearModel:
     ``sides``: side of each limit of the plant, in words
     ``edges``: side on which the model holds, "above" or "below", by name of each state or input at a kink
     ``delays``: delays that the model omits
-    ``sent_per_opening``: slope of the inverted table of openings [-]; 1 without a table
     ``margins``: margins of the loop with the scenario's controller and these delays; None unless it is a PID
     """
 
@@ -199,7 +145,6 @@ class LinearModel:
     sides: Mapping[str, str]
     edges: Mapping[str, str]
     delays: OmittedDelays
-    sent_per_opening: float = 1.0
     margins: LoopMargins | None = None
 
     @property
@@ -213,34 +158,30 @@ class LinearModel:
 
         Raises ScenarioError for an unknown output or input, and for a frequency at which the model has a pole.
         """
-        for name, names, kind in ((output, self.outputs, "output"), (source, self.inputs, "input")):
+        for name, names, role in ((output, self.outputs, "output"), (source, self.inputs, "input")):
             if name not in names:
-                raise ScenarioError(f"the linear model has no {kind} '{one_line(name)}'{known_names(name, names)}")
-        row, column = self.outputs.index(output), self.inputs.index(source)
-        asked = np.asarray(frequencies, dtype=np.float64).ravel()
-        matrices = scaled = 2.0j * np.pi * asked[:, None, None] * np.eye(len(self.states)) - self.A
-        # States and their rates differ by powers of ten in SI: rank is taken with rows and columns of one size.
-        for axis in (2, 1):
-            largest = np.max(np.abs(scaled), axis=axis, keepdims=True, initial=0.0)
-            scaled = scaled / np.where(largest > 0.0, largest, 1.0)
-        for frequency in asked[np.linalg.cond(scaled) > _SINGULAR]:
+                raise ScenarioError(f"the linear model has no {role} '{one_line(name)}'{known_names(name, names)}")
+        row, column, poles = self.outputs.index(output), self.inputs.index(source), self.poles
+        points = 2.0j * np.pi * np.asarray(frequencies, dtype=np.float64).ravel()
+        away = np.min(np.abs(points[:, None] - poles), axis=1)
+        # Eigenvalues are that accurate.
+        for point in points[away <= 1.0e-12 * np.max(np.abs(poles))]:
             raise ScenarioError(
-                f"{self.scenario.name}: the linear model has a pole at {frequency:g} Hz, where its response is "
-                f"infinite; give another frequency"
+                f"{self.scenario.name}: the linear model has a pole at {point.imag / (2.0 * np.pi):g} Hz, where its "
+                "response is infinite; give another frequency"
             )
-        return np.asarray(
-            np.linalg.solve(matrices, self.B[:, column, None])[:, :, 0] @ self.C[row] + self.D[row, column]
-        )
+        matrices = points[:, None, None] * np.eye(len(self.states)) - self.A
+        response = np.linalg.solve(matrices, self.B[:, column, None])[:, :, 0] @ self.C[row] + self.D[row, column]
+        return np.asarray(response)
 
     def json_document(self) -> dict[str, Any]:
         """Return operating point, matrices, poles and sides as plain data in SI."""
         signals = {
-            kind: [{"name": name, "unit": UNITS[name], "value": self.values[name]} for name in getattr(self, kind)]
-            for kind in _SIGNALS
+            role: [{"name": name, "unit": UNITS.get(name, "1"), "value": self.values[name]} for name in names]
+            for role, names in zip(_SIGNALS, (self.states, self.inputs, self.outputs), strict=True)
         }
-        signals["states"] = [
-            {**signal, "rate": rate} for signal, rate in zip(signals["states"], self.rates.tolist(), strict=True)
-        ]
+        for signal, rate in zip(signals["states"], self.rates.tolist(), strict=True):
+            signal["rate"] = rate
         return {
             "format": "ppafo linear model",
             "schema_version": 1,
@@ -254,7 +195,7 @@ class LinearModel:
             "sides": dict(self.sides),
             "edges": [{"name": name, "is_above": side == "above"} for name, side in self.edges.items()],
             "left_out": dict(zip(("command_delay", "signal_delay", "sample_period"), self.delays, strict=True)),
-            "margins": None if self.margins is None else asdict(self.margins),
+            "margins": plain(self.margins),
         }
 
     def to_control(self) -> Any:
@@ -263,44 +204,51 @@ class LinearModel:
         Raises ScenarioError if the extra ``control`` is not installed.
         """
         if find_spec("control") is None:
-            raise ScenarioError(MISSING_CONTROL)
+            raise ScenarioError("a system for python-control needs the package control: pip install ppafo[control]")
         import control
 
-        names = {kind: list(getattr(self, kind)) for kind in _SIGNALS}
+        names = {role: list(getattr(self, role)) for role in _SIGNALS}
         return control.ss(self.A, self.B, self.C, self.D, name=self.scenario.name.replace("-", "_"), **names)
 
 
 def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
     """Return the linear model of a scenario at a time [s] of its run, a number or a text, or at ``EQUILIBRIUM``.
 
-    Raises ScenarioError for regulated supplies, an on/off valve, and an operating point that does not exist.
+    A time is rounded to the nearest step. Raises ScenarioError for regulated supplies, an on/off valve, a time outside
+    the run, and an operating point that does not exist.
     """
-    run = plan_run(scenario)
+    run, fault = plan_run(scenario), ""
     if scenario.supply_lines is not None:
         raise ScenarioError(f"{scenario.name}: the linear model assumes a constant supply pressure; omit [supply_line]")
     if run.program.valve.regulates:
-        raise ScenarioError(
-            f"{scenario.name}: valve '{scenario.device.valve_name}' regulates pressures, of which there is no linear "
-            "model; set device.valve to a proportional valve"
+        fault = "regulates pressures, of which there is no linear model"
+    else:
+        # A small change of the command changes openings or their rates somewhere; a table of openings may be flat.
+        still = dict(zip(valve_states(run.program), numbers(run.program.valve.initial()), strict=True))
+        plant, commands = (
+            plant_of(_without_slew_limit(run), None, still | {"command": 0.0}),
+            np.linspace(-0.95, 0.95, 20),
         )
-    # A small change of the command changes the openings or their rates somewhere.
-    still = dict(zip(valve_states(run.program), numbers(run.program.valve.initial()), strict=True))
-    plant = plant_of(_without_slew_limit(run), None, still | {"command": 0.0})
-    first, second = (
-        [plant.valve(still | {"command": command + change})[1:] for command in _TRIED_COMMANDS]
-        for change in (1.0e-4, 2.0e-4)
-    )
-    if first == second:
-        raise ScenarioError(
-            f"{scenario.name}: valve '{scenario.device.valve_name}' switches on and off, so its flow has no "
-            "derivative with respect to the command; set device.valve to a proportional valve"
+        first, second = (
+            [plant.valve(still | {"command": command})[1:] for command in (commands + change).tolist()]
+            for change in (1.0e-4, 2.0e-4)
         )
+        if first == second:
+            fault = "switches on and off, so its flow has no derivative with respect to the command"
+    if fault:
+        valve = f"valve '{scenario.device.valve_name}'"
+        raise ScenarioError(f"{scenario.name}: {valve} {fault}; set device.valve to a proportional valve")
     if at == EQUILIBRIUM:
-        return model_at(scenario, run, equilibrium(scenario))
+        return model_at(scenario, run, equilibrium(scenario, run), None)
     problem = f"{scenario.name}: {argument_text('at', str(at))} must be a time, for example '1 s', or '{EQUILIBRIUM}'"
     with refused_as(ScenarioError, problem, UnitError):
         time = float(at) if isinstance(at, Real) else parse_quantity(str(at), "s")
-    return model_at(scenario, run, point_at(scenario, time))
+    # Allowance for rounding: the end of the run itself is a valid time.
+    if not 0.0 <= time <= scenario.run.duration * (1.0 + 1.0e-12):
+        place = argument_text("at", f"{time:g} s")
+        raise ScenarioError(f"{scenario.name}: {place} is outside the run, which lasts {scenario.run.duration:g} s")
+    steps = min(round(time / run.step), run.step_count)
+    return model_at(scenario, run, values_after(scenario, run, steps), steps * run.step)
 
 
 # Plant without controller and sensors, as a function of named values.
@@ -321,23 +269,17 @@ class LinearisedPlant:
     time: float
     functions: PythonFunctions
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names of the inputs of the linear model."""
-        more = _MOTION if self.direction is None else ("external_torque",) if self.direction else ()
-        return ("command", *(_SUPPLIES[:1] if self.run.program.has_one_chamber else _SUPPLIES), *more)
-
     def at(self, values: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:
         """Return time derivatives and outputs for values of all states and inputs by name [SI].
 
         A valve state that follows the command immediately does not count as a state: its derivative is 0.
         """
         run, program, call = self.run, self.run.program, self.functions.of
-        driven: dict[str, Any] = {name: values[name] for name in _DRIVEN}
+        driven: dict[str, Any] = {name: values[name] for name in (*_SUPPLIES, "external_torque")}
         plant = run.plant._replace(**driven)
         motion, pressures = (values["angle"], values["angular_velocity"]), (values["pressure_1"], values["pressure_2"])
         warm = run.thermal if isinstance(run.thermal, ThermalParameters) else None
-        temperatures = (values.get("temperature_1", 0.0), values.get("temperature_2", 0.0))
+        temperatures = tuple(values.get(name, 0.0) for name in _TEMPERATURES)
         _, openings, valve_rates = self.valve(values)
         gas = call(gas_rates)(plant, warm, openings, motion, pressures, temperatures, parts=program.functions)
         rates = {}
@@ -346,8 +288,7 @@ class LinearisedPlant:
             added = program.foot.torque(program, run.leg, self.time, motion[0]) if program.foot is not None else 0.0
             moved = call(free_motion)(plant, *motion, *pressures, added, self.direction, parts=program.functions)
             rates = dict(zip(_MOTION, moved, strict=True))
-        rates |= {"pressure_1": gas.pressure_1, "pressure_2": gas.pressure_2}
-        rates |= {} if warm is None else {"temperature_1": gas.temperature_1, "temperature_2": gas.temperature_2}
+        rates |= {name: getattr(gas, name) for name in (*_PRESSURES, *(() if warm is None else _TEMPERATURES))}
         outputs = {"torque": program.actuator.torque(plant, motion[0], *pressures)}
         outputs |= {name: values[name] for name in rates} | {"supplied_flow": gas.supplied, "vented_flow": gas.vented}
         return rates | valve_rates, outputs | {name: values[name] for name in valve_rates}
@@ -391,24 +332,147 @@ def _without_slew_limit(run: Run) -> Run:
     return replace(run, valve=run.valve._replace(slew_limit=NO_SLEW_LIMIT)) if is_limited else run
 
 
-# Slopes by differences, towards one side of a point, where the model may have a kink.
+# Operating point: an instant of a run, or the steady state.
+
+
+def values_after(scenario: Scenario, run: Run, steps: int) -> dict[str, float]:
+    """Return the states and inputs after a number of steps of a scenario's run [SI], by name."""
+    batch = batch_of(replace(run, step_count=steps))
+    custom = scenario.controller.custom
+    outcome = run_batch(batch) if custom is None else run_sampled(batch, custom)
+    rows = {name: float(outcome.states[row, 0]) for name, row in state_row_numbers(run).items()}
+    if rows["result.failure_time"] < NEVER_FAILED or not all(map(np.isfinite, rows.values())):
+        raise SimulationError(
+            f"{scenario.name}: the run diverges before {steps * run.step:g} s; give an earlier {argument_text('at')}, "
+            "or see the cause with 'ppafo simulate'"
+        )
+    angle, rate = rows["state.angle"], rows["state.angular_velocity"]
+    if run.program.angle is not None:
+        angle, rate, _ = run.program.angle.value(run.path, steps * run.step)
+    pressures = pressures_of(run.program.actuator, run.plant, angle, rows["state.mass_1"], rows["state.mass_2"])
+    values = {"angle": angle, "angular_velocity": rate, "command": rows["result.command"]}
+    values |= dict(zip(_PRESSURES, map(float, pressures), strict=True))
+    values |= {name: float(getattr(run.plant, name)) for name in (*_SUPPLIES, "external_torque")}
+    values |= {name: rows[path] for name, path in valve_states(run.program).items()}
+    if isinstance(run.thermal, ThermalParameters):
+        for side in (1, 2):
+            warm = rows[f"state.mass_{side}"] / rows[f"masses.mass_{side}"]
+            values[f"temperature_{side}"] = run.thermal.temperature * warm
+    return values
+
+
+def _direction(run: Run, values: Mapping[str, float], time: float) -> float | None:
+    """Direction of a free vane at a time [s], 0 if it is stuck; None if the ankle is prescribed."""
+    if run.program.angle is not None:
+        return None
+    if values["angular_velocity"] != 0.0:
+        return 1.0 if values["angular_velocity"] > 0.0 else -1.0
+    angle, *pressures = (values[name] for name in ("angle", *_PRESSURES))
+    limit = in_program(friction_at_rest, run.program, run.effects)({}, run.plant.static_torque, *pressures)
+    torque = torque_at_rest(run)({}, time, angle, *pressures)
+    return mode_at_rest(run.plant._replace(static_torque=limit), angle, torque)
+
+
+def equilibrium(scenario: Scenario, run: Run) -> dict[str, float]:
+    """Return states and inputs in the steady state of a scenario [SI], by name; ScenarioError if there is none.
+
+    The ankle rests at its angle at the end of the run, and all states of chambers and valve are constant. The actuator
+    torque, or the pressure that is controlled, is the last value of the reference; for a constant command, the command
+    is given instead.
+    """
+
+    def refusal(reason: str) -> ScenarioError:
+        return ScenarioError(f"{scenario.name}: {reason}; give a time of the run, such as {argument_text('at', '1 s')}")
+
+    if run.leg is not None and run.program.shank is not CONSTANT:
+        raise refusal("there is no equilibrium while the shank moves")
+    values = values_after(scenario, run, run.step_count) | {"angular_velocity": 0.0}
+    quantity, level = CONTROLLED[scenario.controlled], None
+    if not scenario.controller.is_open_loop:
+        if quantity.name == ANGLE:
+            raise refusal(f"reference.of = '{ANGLE}': an equilibrium needs a reference of torque or pressure")
+        level = float(profile_values(scenario.reference, np.array([scenario.run.duration]))[0][0])
+    plant = plant_of(_without_slew_limit(run), None if run.program.angle is not None else 0.0, values)
+    steady = _steady(plant, values, quantity, level)
+    openings = ["command", *(name for name in values if name in _OPENINGS)]
+    if steady is None and level is None:
+        raise refusal(f"no equilibrium was found for the command {values['command']:g}")
+    if steady is None:
+        assert level is not None
+        full, reached = 1.0 if (level > 0.0) != scenario.device.supply.is_vacuum else -1.0, ""
+        most = _steady(plant, values | dict.fromkeys(openings, full), quantity, None)
+        if most is not None and quantity.name == TORQUE:
+            reached = f": with the valve fully open the actuator reaches {plant.at(most)[1]['torque']:.4g} N m"
+        asked = of_path("reference.level", quantity.level.unit, ".4g").text(level)
+        raise refusal(f"there is no equilibrium at {asked}, the last value of the reference{reached}")
+    if _direction(run, steady, scenario.run.duration):
+        degrees = np.degrees(values["angle"])
+        raise refusal(f"there is no equilibrium, because the torque accelerates the vane at {degrees:.4g} deg")
+    # A valve that is closed but for rounding is closed.
+    steady |= {name: 0.0 for name in openings if abs(steady[name]) < _STEADY}
+    # States that the valve takes from its command at once were no unknowns.
+    return steady | dict(zip(valve_states(run.program), numbers(plant.valve(steady)[0]), strict=True))
+
+
+def _steady(
+    plant: LinearisedPlant, values: Mapping[str, float], quantity: ControlledQuantity, level: float | None
+) -> dict[str, float] | None:
+    """Return a steady state at a level of a quantity [SI], or at the present command; None if the search fails."""
+    from scipy.optimize import least_squares
+
+    # The unknowns are all states, and the command if a level is given.
+    names = [*plant.at(values)[0], *([] if level is None else ["command"])]
+    sizes = np.array([size_of(name) for name in names])
+    least, most = (
+        [end if name in ("command", *_OPENINGS) else other for name, other in zip(names, others, strict=True)]
+        for end, others in ((-1.0, np.where(sizes > 1.0, 0.0, -np.inf)), (1.0, np.full(sizes.size, np.inf)))
+    )
+
+    def imbalance(unknowns: Floats, start: Mapping[str, float]) -> Floats:
+        """Return time derivatives relative to the size of the states [1/s], and relative error of the level [-]."""
+        tried = {**start, **dict(zip(names, unknowns.tolist(), strict=True))}
+        rates, outputs = plant.at(tried)
+        reached = quantity.value(tried["angle"], tried["pressure_1"], tried["pressure_2"], outputs["torque"])
+        wrong = [] if level is None else [(reached - level) / quantity.size]
+        return np.array([*(rate / size_of(name) for name, rate in rates.items()), *wrong])
+
+    # Where the search begins: at the end of the run, then about the pressures that have the level.
+    starts, lowest = [dict(values)], plant.run.plant.atmospheric_pressure
+    target = 0.0 if level is None else level - quantity.value(values["angle"], lowest, lowest, 0.0)
+    surplus = abs(target) / (plant.run.plant.torque_constant if quantity.name == TORQUE else 1.0)
+    for size in (0.01, 0.1, 0.003, 0.03, 0.3, 1.0):
+        command = values["command"] if level is None else size if target * quantity.sign >= 0.0 else -size
+        pressures = [1.001 * lowest + (surplus if is_fed else 0.0) for is_fed in (command > 0.0, command < 0.0)]
+        openings = {name: command for name in ("command", *_OPENINGS) if name in values}
+        starts.append({**values, **dict(zip(_PRESSURES, pressures, strict=True)), **openings})
+    for start in starts:
+        # Least squares instead of a solver that refuses: in a dead band the slopes are singular. A search that fails,
+        # as of a valve without area, says so by its sum.
+        with np.errstate(all="ignore"):
+            first = np.clip([start[name] for name in names], least, most)
+            exact: dict[str, Any] = {"ftol": None, "gtol": None, "xtol": 1.0e-15}
+            found = least_squares(imbalance, first, bounds=(least, most), x_scale=sizes, args=(start,), **exact)
+        if np.max(np.abs(found.fun)) < _STEADY:
+            return {**start, **dict(zip(names, found.x.tolist(), strict=True))}
+    return None
+
+
+# The model at a point: slopes by differences, towards one side where the model may have a kink.
 
 
 def size_of(name: str) -> float:
-    """Return the reference size of a state or an input [SI], by which steps of finite differences are scaled."""
+    """Return the reference size of a state or an input [SI]."""
     return _SIZES.get(UNITS.get(name, ""), 1.0)
 
 
-def side_of(name: str, values: Mapping[str, float], direction: float | None) -> float:
+def side_of(name: str, value: float, direction: float | None) -> float:
     """Return the side of a value (1 or -1) for which a linear model holds.
 
     The command and the valve opening increase, or decrease from full opening. Angle, pressure 1 and its supply
     increase; the angular velocity changes in the direction of motion; all other values decrease.
     """
-    if name == "command":
-        return 1.0 if abs(values[name]) < 1.0 else -float(np.sign(values[name]))
-    if name in _OPENINGS:
-        return 1.0 if values[name] < 1.0 else -1.0
+    if name in ("command", *_OPENINGS):
+        return 1.0 if value < 1.0 else -1.0
     if name == "angular_velocity" and direction:
         return direction
     return 1.0 if name in ("pressure_1", "supply_pressure", *_MOTION) else -1.0
@@ -435,385 +499,215 @@ def one_sided_slopes(function: Callable[[float], Floats], at: float, side: float
     return best, errors
 
 
-# Operating point: an instant of a run, or the steady state.
+def model_at(scenario: Scenario, run: Run, values: Mapping[str, float], time: float | None) -> LinearModel:
+    """Return the linear model of a run at given states and inputs [SI], with slopes on the sides given by ``side_of``.
 
-
-@dataclass(frozen=True, slots=True)
-class Point:
-    """Operating point: time [s] in the run, None if steady; values of states and inputs [SI]; direction of the vane."""
-
-    time: float | None
-    values: Mapping[str, float]
-    direction: float | None
-
-
-def point_at(scenario: Scenario, time: float) -> Point:
-    """Return the operating point of a scenario's run at a time [s], rounded to the nearest step.
-
-    Raises ScenarioError for a time outside the run.
+    ``time`` [s] is that of the run, None for a steady state.
     """
-    # Allowance for rounding: the end of the run itself is a valid time.
-    if not 0.0 <= time <= scenario.run.duration * (1.0 + 1.0e-12):
-        raise ScenarioError(
-            f"{scenario.name}: {argument_text('at', f'{time:g} s')} is outside the run, which lasts "
-            f"{scenario.run.duration:g} s"
-        )
-    run = plan_run(scenario)
-    steps = min(round(time / run.step), run.step_count)
-    values = _after(scenario, run, steps)
-    return Point(steps * run.step, values, _direction(run, values, steps * run.step))
-
-
-def _after(scenario: Scenario, run: Run, steps: int) -> dict[str, float]:
-    """Return the states and inputs after a number of steps of a run."""
-    batch = batch_of(replace(run, step_count=steps))
-    custom = scenario.controller.custom
-    outcome = run_batch(batch) if custom is None else run_sampled(batch, custom)
-    rows = {name: float(outcome.states[row, 0]) for name, row in state_row_numbers(run).items()}
-    if rows["result.failure_time"] < NEVER_FAILED or not all(map(np.isfinite, rows.values())):
-        raise SimulationError(
-            f"{scenario.name}: the run diverges before {steps * run.step:g} s; give an earlier {argument_text('at')}, "
-            "or see the cause with 'ppafo simulate'"
-        )
-    angle, rate = rows["state.angle"], rows["state.angular_velocity"]
-    if run.program.angle is not None:
-        angle, rate, _ = run.program.angle.value(run.path, steps * run.step)
-    pressures = pressures_of(run.program.actuator, run.plant, angle, rows["state.mass_1"], rows["state.mass_2"])
-    values = {"angle": angle, "angular_velocity": rate, "command": rows["result.command"]}
-    values |= dict(zip(("pressure_1", "pressure_2"), map(float, pressures), strict=True))
-    values |= {name: float(getattr(run.plant, name)) for name in _DRIVEN}
-    values |= {name: rows[path] for name, path in valve_states(run.program).items()}
-    if isinstance(run.thermal, ThermalParameters):
-        warm = [rows[f"state.mass_{side}"] / rows[f"masses.mass_{side}"] for side in (1, 2)]
-        values |= {f"temperature_{side}": run.thermal.temperature * warm[side - 1] for side in (1, 2)}
-    return values
-
-
-def _direction(run: Run, values: Mapping[str, float], time: float) -> float | None:
-    """Direction of a free vane at a time [s], 0 if it is stuck; None if the ankle is prescribed."""
-    if run.program.angle is not None:
-        return None
-    if values["angular_velocity"] != 0.0:
-        return 1.0 if values["angular_velocity"] > 0.0 else -1.0
-    limit, plant = in_program(friction_at_rest, run.program, run.effects), run.plant
-    pressures = values["pressure_1"], values["pressure_2"]
-    plant = plant._replace(static_torque=limit({}, plant.static_torque, *pressures))
-    return mode_at_rest(plant, values["angle"], torque_at_rest(run)({}, time, values["angle"], *pressures))
-
-
-def equilibrium(scenario: Scenario) -> Point:
-    """Return the steady state of a scenario; ScenarioError if there is none.
-
-    The ankle rests at its angle at the end of the run, and all states of chambers and valve are constant. The actuator
-    torque, or the pressure that is controlled, is the last value of the reference; for a constant command, the command
-    is given instead.
-    """
-    planned, name = plan_run(scenario), scenario.name
-
-    def refusal(reason: str) -> ScenarioError:
-        return ScenarioError(f"{name}: {reason}; give a time of the run, such as {argument_text('at', '1 s')}")
-
-    if planned.leg is not None and planned.program.shank is not CONSTANT:
-        raise refusal("there is no equilibrium while the shank moves")
-    values = _after(scenario, planned, planned.step_count) | {"angular_velocity": 0.0}
-    is_open_loop, quantity = scenario.controller.is_open_loop, CONTROLLED[scenario.controlled]
-    if quantity.name == ANGLE and not is_open_loop:
-        raise refusal(f"reference.of = '{ANGLE}': an equilibrium needs a reference of torque or pressure")
-    end = np.array([scenario.run.duration])
-    level = None if is_open_loop else float(profile_values(scenario.reference, end)[0][0])
-    run, is_held = _without_slew_limit(planned), planned.program.angle is not None
-    plant = plant_of(run, None if is_held else 0.0, values)
-    steady = _steady(plant, values, quantity, level)
-    if steady is None:
-        if level is None:
-            raise refusal(f"no equilibrium was found for the command {values['command']:g}")
-        full, reached = 1.0 if (level > 0.0) != scenario.device.supply.is_vacuum else -1.0, ""
-        most = _steady(plant, values | dict.fromkeys(("command", *_openings_in(values)), full), quantity, None)
-        if most is not None and quantity.name == TORQUE:
-            reached = f": with the valve fully open the actuator reaches {plant.at(most)[1]['torque']:.4g} N m"
-        asked = of_path("reference.level", quantity.level.unit, ".4g").text(level)
-        raise refusal(f"there is no equilibrium at {asked}, the last value of the reference{reached}")
-    if _direction(run, steady, scenario.run.duration):
-        degrees = np.degrees(values["angle"])
-        raise refusal(f"there is no equilibrium, because the torque accelerates the vane at {degrees:.4g} deg")
-    # A valve that is closed but for rounding is closed.
-    steady |= {name: 0.0 for name in ("command", *_openings_in(steady)) if abs(steady[name]) < _STEADY}
-    # States that the valve takes from its command at once were no unknowns.
-    at_rest = numbers(plant.valve(steady)[0])
-    return Point(None, steady | dict(zip(valve_states(run.program), at_rest, strict=True)), None if is_held else 0.0)
-
-
-def _openings_in(values: Mapping[str, float]) -> list[str]:
-    return [name for name in values if name in _OPENINGS]
-
-
-def _steady(
-    plant: LinearisedPlant, values: Mapping[str, float], quantity: ControlledQuantity, level: float | None
-) -> dict[str, float] | None:
-    """Return a steady state at a level of a quantity [SI], or at the present command; None if the search fails."""
-    from scipy.optimize import least_squares
-
-    # Where the search begins: at the end of the run, then about the pressures that have the level.
-    starts, lowest = [dict(values)], plant.run.plant.atmospheric_pressure
-    target = (level or 0.0) - (lowest if quantity.level.unit == "Pa_a" and level is not None else 0.0)
-    surplus = abs(target) / (plant.run.plant.torque_constant if quantity.name == TORQUE else 1.0)
-    for size in _FIRST_COMMANDS:
-        command = values["command"] if level is None else size if target * quantity.sign >= 0.0 else -size
-        pressures = [1.001 * lowest + (surplus if is_fed else 0.0) for is_fed in (command > 0.0, command < 0.0)]
-        start = {"pressure_1": pressures[0], "pressure_2": pressures[1], "command": command}
-        starts.append({**values, **start, **dict.fromkeys(_openings_in(values), command)})
-    # The unknowns are all states, and the command if a level is given.
-    names = [*plant.at(values)[0], *([] if level is None else ["command"])]
-    sizes = np.array([size_of(name) for name in names])
-
-    def imbalance(start: Mapping[str, float], unknowns: Floats) -> Floats:
-        """Return time derivatives relative to the size of the states [1/s], and relative error of the level [-]."""
-        tried = {**start, **dict(zip(names, unknowns.tolist(), strict=True))}
-        rates_by_name, outputs = plant.at(tried)
-        # So that pascals and openings count alike.
-        rates = [rate / size_of(name) for name, rate in rates_by_name.items()]
-        if level is None:
-            return np.array(rates)
-        reached = quantity.value(tried["angle"], tried["pressure_1"], tried["pressure_2"], outputs["torque"])
-        return np.array([*rates, (reached - level) / quantity.size])
-
-    least = [
-        -1.0 if name == "command" or name in _OPENINGS else 0.0 if size_of(name) > 1.0 else -np.inf for name in names
-    ]
-    most = [1.0 if name == "command" or name in _OPENINGS else np.inf for name in names]
-    for start in starts:
-        # Least squares instead of a solver that refuses: in a dead band the slopes are singular.
-        first = np.clip([start[name] for name in names], least, most)
-        # A search that fails, as of a valve without area, says so by its sum.
-        with np.errstate(all="ignore"):
-            found = least_squares(
-                partial(imbalance, start),
-                first,
-                bounds=(least, most),
-                x_scale=sizes,
-                ftol=None,
-                gtol=None,
-                xtol=1.0e-15,
-            )
-        if np.max(np.abs(found.fun)) < _STEADY:
-            return {**start, **dict(zip(names, found.x.tolist(), strict=True))}
-    return None
-
-
-# The model at a point.
-
-
-def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
-    """Return the linear model at an operating point, with one-sided slopes on the sides given by ``side_of``."""
-    values, plant = point.values, plant_of(run, point.direction, point.values, point.time or 0.0)
+    direction = _direction(run, values, scenario.run.duration if time is None else time)
+    plant = plant_of(run, direction, values, time or 0.0)
     rates_here, outputs_here = plant.at(values)
+    has_one_chamber = run.program.has_one_chamber
+    inputs = ("command", *_SUPPLIES[: 1 if has_one_chamber else 2])
+    inputs += _MOTION if direction is None else ("external_torque",) if direction else ()
+    columns = [*rates_here, *inputs]
+    sides = {name: side_of(name, values[name], direction) for name in columns}
 
-    def slopes(name: str, side: float) -> tuple[Floats, Floats]:
-        def rates_and_outputs(value: float) -> Floats:
-            rates, outputs = plant.at({**values, name: value})
-            return np.array([*rates.values(), *outputs.values()])
+    def rates_and_outputs(name: str, value: float) -> Floats:
+        rates, outputs = plant.at({**values, name: value})
+        return np.array([*rates.values(), *outputs.values()])
 
-        return one_sided_slopes(rates_and_outputs, values[name], side, size_of(name))
-
-    columns = [*rates_here, *plant.inputs]
-    sides = {name: side_of(name, values, point.direction) for name in columns}
     # Slopes of rates and outputs on the side of ``side_of`` and on the other side, and estimates of their errors.
-    near, near_errors = np.stack([slopes(name, sides[name]) for name in columns], axis=-1)
-    far, far_errors = np.stack([slopes(name, -sides[name]) for name in columns], axis=-1)
-    # A value that the valve takes from its command at once is no state: only the output that shows it needs it.
-    rows = [*(f"rate of {state}" for state in rates_here), *outputs_here]
-    # A second chamber that the actuator lacks stays at the atmosphere, without any slope.
-    idle = [name for name in rates_here if run.program.has_one_chamber and name in OF_SECOND_CHAMBER]
-    for place, name in enumerate(columns):
-        others = [row != name for row in rows]
-        if name.startswith(VALVE) and not np.any(near[others, place]) and not np.any(far[others, place]):
-            idle.append(name)
+    (near, near_errors), (far, far_errors) = (
+        np.stack(
+            [
+                one_sided_slopes(partial(rates_and_outputs, name), values[name], side * sides[name], size_of(name))
+                for name in columns
+            ],
+            axis=-1,
+        )
+        for side in (1.0, -1.0)
+    )
+    # A second chamber that the actuator lacks stays at the atmosphere, without any slope. A value that the valve takes
+    # from its command at once is no state: only the output that shows it needs it.
+    needing = np.count_nonzero((near != 0.0) | (far != 0.0), axis=0)
+    idle = OF_SECOND_CHAMBER if has_one_chamber else frozenset()
+    idle |= {name for name, rows in zip(columns, needing, strict=True) if name.startswith(VALVE) and rows == 1}
     is_row = np.array([name not in idle for name in (*rates_here, *outputs_here)])
     is_column = np.array([name not in idle for name in columns])
     near, far, errors = (whole[is_row][:, is_column] for whole in (near, far, near_errors + far_errors))
-    states, outputs, columns = (
-        [name for name in names if name not in idle] for names in (rates_here, outputs_here, columns)
+    states, changed, outputs = (
+        tuple(name for name in names if name not in idle) for names in (rates_here, columns, outputs_here)
     )
-    sizes = np.array([size_of(name) for name in columns])
+    sizes, count = np.array([size_of(name) for name in changed]), len(states)
     largest = np.max(np.maximum(np.abs(near), np.abs(far)) * sizes, axis=1, keepdims=True)
     is_kink = np.any(np.abs(near - far) * sizes > _ON_THE_EDGE * largest + 10.0 * errors * sizes, axis=0)
     near = np.where(np.abs(near) * sizes > _ZERO * largest, near, 0.0)
-    count = len(states)
-    in_words = limits_of(scenario, plant, point)
-    # The command is the first input.
-    if not np.any(near[:, count]):
-        in_words["valve"] += f"; {DEAF}"
-    sent_per_opening = 1.0
-    if run.program.inverts_valve:
-        opening, sent = (in_program(port, run.program, run.effects) for port in (at_valve, sent_command))
-        wanted = opening({}, values["command"])
-        sent_per_opening = float(one_sided_slopes(lambda at: np.array([sent({}, at)]), wanted, 1.0, 1.0)[0][0])
-    kinks = [name for name, differs in zip(columns, is_kink.tolist(), strict=True) if differs]
     model = LinearModel(
         scenario=scenario,
-        time=point.time,
-        states=tuple(states),
-        inputs=plant.inputs,
-        outputs=tuple(outputs),
-        values={name: ({**values, **outputs_here})[name] for name in (*states, *plant.inputs, *outputs)},
+        time=time,
+        states=states,
+        inputs=inputs,
+        outputs=outputs,
+        values={name: ({**values, **outputs_here})[name] for name in (*states, *inputs, *outputs)},
         A=near[:count, :count],
         B=near[:count, count:],
         C=near[count:, :count],
         D=near[count:, count:],
         rates=np.array([rates_here[name] for name in states]),
-        sides=in_words,
-        edges={name: "above" if sides[name] > 0.0 else "below" for name in kinks},
+        # The command is the first input.
+        sides=limits_of(scenario, plant, values, has_effect=bool(np.any(near[:, count]))),
+        edges={
+            name: "above" if sides[name] > 0.0 else "below" for name, kink in zip(changed, is_kink, strict=True) if kink
+        },
         delays=OmittedDelays(run.command_delay, run.signal_delay, run.period),
-        sent_per_opening=sent_per_opening,
     )
-    return replace(model, margins=loop_margins(model))
+    sent_per_opening = 1.0
+    if run.program.inverts_valve:
+        opening, sent = (in_program(port, run.program, run.effects) for port in (at_valve, sent_command))
+        wanted = opening({}, values["command"])
+        sent_per_opening = float(one_sided_slopes(lambda at: np.array([sent({}, at)]), wanted, 1.0, 1.0)[0][0])
+    return replace(model, margins=loop_margins(model, sent_per_opening))
 
 
-def limits_of(scenario: Scenario, linearised: LinearisedPlant, point: Point) -> dict[str, str]:
-    """Return the side of each limit at the operating point, in words, by component."""
-    at, run, joint, plant = point.values, linearised.run, scenario.device.joint, linearised.run.plant
-    openings = linearised.valve(at)[1]
-    atmosphere, pressure_1, pressure_2 = plant.atmospheric_pressure, at["pressure_1"], at["pressure_2"]
+def limits_of(
+    scenario: Scenario, linearised: LinearisedPlant, at: Mapping[str, float], *, has_effect: bool
+) -> dict[str, str]:
+    """Return the side of each limit at given states and inputs, in words, by component.
+
+    ``has_effect``: False if a small change of the command has no effect
+    """
+    joint, plant, direction = scenario.device.joint, linearised.run.plant, linearised.direction
+    openings, room = linearised.valve(at)[1], plant.atmospheric_pressure
+    pressure_1, pressure_2, supply_1, supply_2 = (at[name] for name in (*_PRESSURES, *_SUPPLIES))
+    chamber = 1 if openings.source_1 > 0.0 else 2
+    verb = "evacuates" if min(supply_1, supply_2) < room else "feeds"
+    valve = f"{verb} chamber {chamber}, open by {max(openings):.4g}" if any(openings) else "closed"
+    if not has_effect:
+        valve += "; a small change of the command has no effect (dead band, slew limit, saturation): the column of the "
+        valve += "command is 0"
+    vane = "locked" if scenario.motion.locked_angle is not None else "prescribed"
+    if direction == 0.0:
+        is_at_stop = not plant.angle_min < at["angle"] < plant.angle_max
+        vane = "against a stop" if is_at_stop else "sticks by static friction"
+    elif direction is not None:
+        vane = f"slides in {joint.positive if direction > 0.0 else joint.negative}"
     paths = [
-        ("source to chamber 1", plant.valve_curve, at["supply_pressure"], pressure_1, openings.source_1),
-        ("chamber 1 to atmosphere", plant.valve_curve, pressure_1, atmosphere, openings.vent_1),
-        ("source to chamber 2", plant.valve_curve, at["dorsiflexion_pressure"], pressure_2, openings.source_2),
-        ("chamber 2 to atmosphere", plant.valve_curve, pressure_2, atmosphere, openings.vent_2),
+        ("source to chamber 1", plant.valve_curve, supply_1, pressure_1, openings.source_1),
+        ("chamber 1 to atmosphere", plant.valve_curve, pressure_1, room, openings.vent_1),
+        ("source to chamber 2", plant.valve_curve, supply_2, pressure_2, openings.source_2),
+        ("chamber 2 to atmosphere", plant.valve_curve, pressure_2, room, openings.vent_2),
         ("leak from chamber to chamber", plant.leak_curve, pressure_1, pressure_2, 1.0),
     ]
-    regimes = {}
-    for name, curve, pressure_a, pressure_b, opening in paths[: 2 if run.program.has_one_chamber else None]:
+    sides = {"valve": valve, joint.name: vane}
+    for name, curve, pressure_a, pressure_b, opening in paths[: 2 if linearised.run.program.has_one_chamber else 5]:
         ratio = min(pressure_a, pressure_b) / max(pressure_a, pressure_b)
         near = ", on the straight line near equal pressures" if ratio > curve.linear_ratio else ""
         flows = f"below choking, pressure ratio {ratio:.4f}{near}"
         flows = f"choked, pressure ratio {ratio:.3f}" if ratio <= curve.critical_ratio else flows
-        regimes[name] = flows if opening else "closed"
-    vane = "locked" if scenario.motion.locked_angle is not None else "prescribed"
-    if point.direction == 0.0:
-        is_at_stop = not plant.angle_min < at["angle"] < plant.angle_max
-        vane = "against a stop" if is_at_stop else "sticks by static friction"
-    elif point.direction is not None:
-        vane = f"slides in {joint.positive if point.direction > 0.0 else joint.negative}"
-    valve = "closed"
-    if any(openings):
-        chamber = 1 if openings.source_1 > 0.0 else 2
-        is_vacuum = min(at["supply_pressure"], at["dorsiflexion_pressure"]) < atmosphere
-        valve = f"{'evacuates' if is_vacuum else 'feeds'} chamber {chamber}, open by {max(openings):.4g}"
-    return {"valve": valve, joint.name: vane, **regimes}
+        sides[name] = flows if opening else "closed"
+    return sides
 
 
 # Control loop with the scenario's own PID.
 
 
-def open_loop(model: LinearModel) -> tuple[Floats, NDArray[np.complex128]] | None:
-    """Return frequencies [Hz] up to half the sample rate, and the open-loop response of PID and plant at each.
+def loop_margins(model: LinearModel, sent_per_opening: float = 1.0) -> LoopMargins | None:
+    """Return the margins of the sampled loop that the scenario's PID closes around a linear model.
 
-    The sampled loop is cut at the command. It has the PID with rectangular integration and filtered difference, a
-    zero-order hold, the delays that the model omits and the bandwidths of the sensors, but no noise or resolution.
+    The loop is one linear system from sample to sample: PID with rectangular integration and filtered difference,
+    command held for a period, the delays that the model omits and the bandwidths of the sensors, but no noise or
+    resolution. Its return difference is the product of z - closed pole over z - open pole: 1 + L = det(z - closed) /
+    det(z - open). ``sent_per_opening`` is the slope of an inverted table of openings.
+
     None for a controller without PID, a command that is clipped or has no effect, or a controlled quantity at rest.
     """
+    from scipy.linalg import expm
+
     scenario, gains, period = model.scenario, model.scenario.controller.settings, model.scenario.controller.period
     command = abs(model.values["command"])
     difference = {"pressure_1": 1.0, "pressure_2": -1.0}
     weights = difference if scenario.controlled == "pressure_difference" else {scenario.controlled: 1.0}
     if scenario.controller.kind not in PID_LAWS or command >= 1.0 or not weights.keys() <= set(model.outputs):
         return None
-    rates = [1.0 / period, *np.abs(model.poles).tolist(), gains["integral_gain"] / (gains["proportional_gain"] or 1.0)]
-    slowest = min(rate for rate in rates if rate > _INTEGRATOR) / (2.0 * np.pi)
-    frequencies = np.geomspace(_BELOW_POLES * slowest, 0.5 / period, _POINTS)
-    row = np.asarray(sum(weight * model.C[model.outputs.index(name)] for name, weight in weights.items()))
+    # The readings of sensors with a bandwidth are states as well; last comes the command.
+    count = len(model.states)
+    sizes = np.array([size_of(name) for name in model.states])
+    row = sizes * sum(weight * model.C[model.outputs.index(name)] for name, weight in weights.items())
+    matrix, shown = np.zeros((2 * count + 1, 2 * count + 1)), np.zeros(2 * count)
+    matrix[:count, :count] = model.A * sizes / sizes[:, None]
+    matrix[:count, -1] = model.B[:, 0] / sizes
+    for index, name in enumerate(model.states):
+        bandwidth = getattr(scenario.sensors, f"{name.partition('_')[0]}_bandwidth", 0.0)
+        matrix[count + index, [index, count + index]] = np.array([1.0, -1.0]) * (2.0 * np.pi * bandwidth or 1.0)
+        shown[index + (count if bandwidth else 0)] = row[index]
+    # A command that comes within the period (but for rounding) acts on its last part; the one before on the first.
+    delay, rest = divmod((model.delays.command + model.delays.signals) / period + 1.0e-9, 1.0)
+    step, early = expm(matrix * period)[:-1], expm(matrix * period * (1.0 - rest))[:-1, -1]
+    # Of the law, with the integral and the filtered difference as the last two states.
+    filtered = period + gains["derivative_filter"]
+    rate, fades = gains["derivative_gain"] / filtered, gains["derivative_filter"] / filtered
+    direct, summed = (
+        gains["proportional_gain"] + gains["integral_gain"] * period + rate,
+        gains["integral_gain"] * period,
+    )
+    # At any frequency, such as a quarter of the sample rate.
+    if not direct * (shown @ np.linalg.solve(1.0j * np.eye(2 * count) - step[:, :-1], step[:, -1])):
+        return None
     # The law skips the dead band that it assumes, within a narrow range of openings.
     band = gains.get("dead_band", 0.0)
     opened = 1.0 - band + (band / SHARPNESS if command < band + (1.0 - band) * SHARPNESS else 0.0)
-    opened *= model.sent_per_opening
-    steered = error_functions(scenario.controlled, scenario.device.supply.is_vacuum).steered(opened)
+    steered = error_functions(scenario.controlled, scenario.device.supply.is_vacuum).steered(opened * sent_per_opening)
+    # States: plant and sensors, the commands of the samples before, and those of the law.
+    past, plant = 2 * count, np.s_[: 2 * count]
+    whole, law = int(delay), past + int(delay) + 1
 
-    def response(frequencies: Floats) -> NDArray[np.complex128]:
-        z = np.exp(2.0j * np.pi * frequencies * period)
-        change = 1.0 - 1.0 / z
-        law = gains["proportional_gain"] + gains["integral_gain"] * period / change
-        law += gains["derivative_gain"] * change / (period + gains["derivative_filter"] * change)
-        return np.asarray(steered * law * _sampled_plant(model, row, z))
+    def poles_of(factor: float) -> NDArray[np.complex128]:
+        """Return the poles [-] of the loop with a factor on the command."""
+        commands = np.eye(law + 2)[past - 1 : law]
+        commands[0] = factor * np.concatenate([shown * direct, np.zeros(whole + 1), [summed, rate * (fades - 1.0)]])
+        system = np.zeros((law + 2, law + 2))
+        system[plant, plant] = step[:, :-1]
+        system[plant] += np.outer(early, commands[whole]) + np.outer(step[:, -1] - early, commands[whole + 1])
+        system[past:law] = commands[:-1]
+        system[law:, plant] = shown
+        system[law:, law:] = np.diag([1.0, fades])
+        return np.asarray(np.linalg.eigvals(system), dtype=np.complex128)
 
-    loop = response(frequencies)
-    if not loop.all():
-        return None
-    start = float(np.abs(loop[0]))
-    if _integrators(frequencies, loop) > 0 and start < _LEAST_START:
-        below = np.geomspace(frequencies[0] * start / _LEAST_START, frequencies[0], _POINTS_BELOW)[:-1]
-        frequencies, loop = np.concatenate([below, frequencies]), np.concatenate([response(below), loop])
-    return frequencies, loop
+    opens, closed = poles_of(0.0), poles_of(-steered)
+    rates = np.array([1.0 / period, *np.abs(model.poles), *np.abs(closed - 1.0) / period])
+    slowest = np.min(rates[rates > _INTEGRATOR]) / (2.0 * np.pi)
+    frequencies = np.geomspace(1.0e-3 * slowest, 0.5 / period, 20_000)
+    z = np.exp(2.0j * np.pi * frequencies * period)[:, None]
+    returned = np.prod((z - closed) / (z - opens), axis=1)
+    loop = returned - 1.0
+    log_gain, follows = np.log(np.abs(loop)), np.abs(loop / returned)
 
+    def crossings(values: Floats, others: Floats, *ends: tuple[float, float]) -> list[tuple[Any, Any]]:
+        """Return frequencies [Hz] at which ``values`` change sign, with ``others`` there, the ones nearest 0 first."""
+        before = np.flatnonzero(values[:-1] * values[1:] < 0.0)
+        share = values[before] / (values[before] - values[before + 1])
+        at, there = (each[before] + share * np.diff(each)[before] for each in (frequencies, others))
+        found = [*zip(at.tolist(), there.tolist(), strict=True), *ends]
+        return sorted(found, key=lambda pair: abs(pair[1])) or [(None, None)]
 
-def _sampled_plant(model: LinearModel, row: Floats, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Return the sampled response at ``z`` of measured states, weighted by ``row``, to a command held for a period."""
-    from scipy.linalg import expm
-
-    count, period, sensors = len(model.states), model.scenario.controller.period, model.scenario.sensors
-    sizes = np.array([size_of(name) for name in model.states])
-    # The readings of sensors with a bandwidth are states as well; then come the command now, and the one before.
-    matrix = np.zeros((2 * count + 1, 2 * count + 1))
-    matrix[:count, :count] = model.A * sizes / sizes[:, None]
-    matrix[:count, -1] = model.B[:, 0] / sizes
-    shown = np.zeros(2 * count)
-    for index, name in enumerate(model.states):
-        bandwidth = getattr(sensors, f"{name.partition('_')[0]}_bandwidth", 0.0)
-        matrix[count + index, [index, count + index]] = np.array([1.0, -1.0]) * (2.0 * np.pi * bandwidth or 1.0)
-        shown[index + (count if bandwidth else 0)] = row[index] * sizes[index]
-    whole, rest = divmod((model.delays.command + model.delays.signals) / period + _ROUNDING, 1.0)
-    step, early = expm(matrix * period), expm(matrix * period * (1.0 - rest))
-    # A command that comes within the period acts on its last part; the one before on the first.
-    late = step[:-1, -1:] - early[:-1, -1:]
-    held = early[:-1, -1:] * z[:, None, None] ** -whole + late * z[:, None, None] ** -(whole + 1.0)
-    responses = np.linalg.solve(z[:, None, None] * np.eye(2 * count) - step[:-1, :-1], held)[:, :, 0]
-    return np.asarray(responses @ shown, dtype=np.complex128)
-
-
-def loop_margins(model: LinearModel) -> LoopMargins | None:
-    """Return the margins of the loop that the scenario's PID closes around a linear model; None without a loop."""
-    found = open_loop(model)
-    if found is None:
-        return None
-    frequencies, loop = found
-    sensitivity = 1.0 / (1.0 + loop)
-    # Nyquist: of a stable closed loop, 1 + L turns by a quarter for each integrator, by a half for each unstable pole.
-    turned = np.unwrap(np.angle(1.0 + loop))
-    log_gain, closed = np.log(np.abs(loop)), np.abs(loop * sensitivity)
-    quarters = _integrators(frequencies, loop) + 2 * np.count_nonzero(model.poles.real > _INTEGRATOR)
-    at_gain = _crossings(log_gain, frequencies, np.angle(-loop))
     # At half the sample rate, where the curve ends, the loop is real.
-    at_phase = _crossings(np.where(loop.real < 0.0, loop.imag, np.nan)[:-1], frequencies, log_gain)
-    at_phase += [(float(frequencies[-1]), float(log_gain[-1]))] if loop[-1].real < 0.0 else []
-    falls = _crossings(closed - np.sqrt(0.5) * closed[0], frequencies, closed)
-    gain_crossover, phase_margin = min(at_gain, key=lambda pair: abs(pair[1]), default=(None, None))
-    phase_crossover, log_margin = min(at_phase, key=lambda pair: abs(pair[1]), default=(None, None))
+    lags = np.where(loop.real < 0.0, loop.imag, np.nan)
+    lags[-1] = np.nan
+    end = [(float(frequencies[-1]), float(log_gain[-1]))] if loop[-1].real < 0.0 else []
+    phase_crossover, log_margin = crossings(lags, log_gain, *end)[0]
+    gain_crossover, phase_margin = crossings(log_gain, np.angle(-loop))[0]
     return LoopMargins(
-        is_stable=bool(round(float(turned[-1] - turned[0]) / (0.5 * np.pi)) == quarters),
+        is_stable=bool(np.max(np.abs(closed)) < 1.0 + _INTEGRATOR * period),
         gain_margin=None if log_margin is None else float(np.exp(-log_margin)),
         phase_crossover=phase_crossover,
         phase_margin=phase_margin,
         gain_crossover=gain_crossover,
-        bandwidth=falls[0][0] if falls else None,
-        peak_sensitivity=float(np.max(np.abs(sensitivity))),
+        bandwidth=crossings(follows - np.sqrt(0.5) * follows[0], frequencies)[0][0],
+        peak_sensitivity=float(np.max(1.0 / np.abs(returned))),
+        frequencies=frequencies,
+        loop=loop,
     )
-
-
-def _integrators(frequencies: Floats, loop: NDArray[np.complex128]) -> int:
-    """Return the number of integrators of a loop, by its slope at the lowest frequency.
-
-    Two sealed chambers are two integrators of one command, of which the loop has one.
-    """
-    return round(float(np.log(np.abs(loop[0] / loop[1])) / np.log(frequencies[1] / frequencies[0])))
-
-
-def _crossings(values: Floats, frequencies: Floats, others: Floats) -> list[tuple[float, float]]:
-    """Frequencies [Hz] at which ``values`` change their sign, each with ``others`` there, by linear interpolation."""
-    found: list[tuple[float, float]] = []
-    for before in np.flatnonzero(values[:-1] * values[1:] < 0.0).tolist():
-        share = values[before] / (values[before] - values[before + 1])
-        frequency, other = (each[before] + share * (each[before + 1] - each[before]) for each in (frequencies, others))
-        found.append((float(frequency), float(other)))
-    return found
 
 
 # Report: operating point, side of each limit, poles, margins, matrices and range of validity.
@@ -835,43 +729,46 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
     sentences.append(f"not in the model: {omitted}, noise, resolution and bandwidth of sensors")
     supply = model.scenario.device.supply
     zero = float(supply.atmospheric_pressure)
-    for name, highest in (("pressure_1", supply.pressure), ("pressure_2", supply.dorsiflexion_pressure)):
+    for name, highest in zip(_PRESSURES, (supply.pressure, supply.dorsiflexion_pressure), strict=True):
         share = (model.values.get(name, zero) - zero) / (float(highest) - zero) if highest > zero else 0.0
-        if share > _FULL:
+        if share > 0.99:
             sentences.append(
                 f"{name} is {100.0 * share:.4g} % of its supply pressure, at the limit of the actuator: hardly any "
                 "flow into the chamber is left, and gains and margins hold for very small changes only"
             )
-    kinks = [
-        f"the plant is not differentiable at this point: the column of `{name}` is valid only {side} its value"
-        for name, side in model.edges.items()
-    ]
-    matrices = []
-    for name, values, rows, columns in (
-        ("A", model.A, model.states, model.states),
-        ("B", model.B, model.states, model.inputs),
-        ("C", model.C, model.outputs, model.states),
-        ("D", model.D, model.outputs, model.inputs),
-    ):
-        titles: list[str | tuple[str, Kind]] = ["", *((name, Kind(form=".5g")) for name in columns)]
-        cells = [(name, *row) for name, row in zip(rows, values.tolist(), strict=True)]
-        matrices.append(Section(f"Matrix {name} (SI)", columns_of(titles, cells)))
-    point = []
+    point, poles = [], []
     outputs = tuple(name for name in model.outputs if name not in model.states)
     for role, names in (("state", model.states), ("input", model.inputs), ("output", outputs)):
         for name in names:
-            unit = UNITS[name]
+            unit = UNITS.get(name, "1")
             kind = Kind("", "" if unit == "1" else unit, quantity_of_unit(unit), ".5g")
             point.append((role, name, unit, kind.text(model.values[name])))
+    # A complex pair is one row.
+    for pole in model.poles.tolist():
+        size, row = abs(pole), list[str | float | None]()
+        if abs(pole.imag) <= 1.0e-6 * size:
+            row = [f"{pole.real:.5g}", None if pole.real == 0.0 else -1.0 / pole.real, None, None]
+        elif pole.imag > 0.0:
+            row = [f"{pole.real:.5g} ± {pole.imag:.5g}i", None, size / (2.0 * np.pi), -pole.real / size]
+        poles += [row] if row else []
+    constant, frequency = (Kind(quantity=quantity) for quantity in ("time", "frequency"))
+    ratio = ("damping ratio", Kind(form=".3f"))
+    matrices = []
+    for name in "ABCD":
+        rows, columns = model.states if name in "AB" else model.outputs, model.states if name in "AC" else model.inputs
+        cells = [(row, *values) for row, values in zip(rows, getattr(model, name).tolist(), strict=True)]
+        titles: list[str | tuple[str, Kind]] = ["", *((column, Kind(form=".5g")) for column in columns)]
+        matrices.append(Section(f"Matrix {name} (SI)", columns_of(titles, cells)))
     # Runs can start there: gas alone is in motion, and the largest step stays below full opening.
     has_gas_alone = all(name.startswith("pressure") for name in model.states)
-    is_small = 0.0 < abs(model.values["command"]) < _LARGEST_COMMAND
+    is_small = 0.0 < abs(model.values["command"]) < 0.7
     can_step = model.time is None and model.scenario.motion.locked_angle is not None and has_gas_alone and is_small
     validity = Section(
         "Range of validity",
         panels=partial(steps_panels, model),
         name="steps",
-        caption=_STEPS_CAPTION,
+        caption="Steps of the command from the steady state, simulated and by the linear model; their difference grows "
+        "with the square of the amplitude.",
         across=2,
         size=(3.0, 2.8),
         title=title,
@@ -883,8 +780,27 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
         said=sentences,
         parts=[
             Section("The point", columns_of(("", "name", "unit in the model", "at the point"), point), left=3),
-            Section("Side of the kink", facts(model.sides.items()), remarks=kinks),
-            _poles(model, title),
+            Section(
+                "Side of the kink",
+                facts(model.sides.items()),
+                remarks=[
+                    f"the plant is not differentiable at this point: the column of `{name}` is valid only {side} its "
+                    "value"
+                    for name, side in model.edges.items()
+                ],
+            ),
+            Section(
+                "Poles",
+                columns_of(("pole (1/s)", ("time constant", constant), ("frequency", frequency), ratio), poles),
+                panels=partial(frequency_panels, model),
+                # The command, which is the first input, may have no effect.
+                name="frequency-response" if np.any(model.B[:, 0]) or np.any(model.D[:, 0]) else "",
+                caption="Open loop, if it has margins: each margin extends from its dot to the dashed line. Torque for "
+                "a small sinusoidal command; dashed: with the dead time, the age of the measurements and half a sample "
+                "period, which the model does not include.",
+                size=(5.4, 2.2),
+                title=title,
+            ),
             _loop(model),
             *matrices,
             *([validity] if can_step else []),
@@ -894,121 +810,78 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
     )
 
 
-def _poles(model: LinearModel, title: str) -> Section:
-    """Return the table of poles with time constants; a complex pair is one row with frequency and damping.
-
-    The frequency response, under ``title``, is drawn if the command, which is the first input, has any effect.
-    """
-    rows: list[tuple[str | float | None, ...]] = []
-    for pole in model.poles.tolist():
-        size = abs(pole)
-        if abs(pole.imag) <= _REAL * size:
-            rows.append((f"{pole.real:.5g}", None if pole.real == 0.0 else -1.0 / pole.real, None, None))
-        elif pole.imag > 0.0:
-            pair = f"{pole.real:.5g} ± {pole.imag:.5g}i"
-            rows.append((pair, None, size / (2.0 * np.pi), -pole.real / size))
-    constant, frequency = (Kind(quantity=quantity) for quantity in ("time", "frequency"))
-    ratio = ("damping ratio", Kind(form=".3f"))
-    return Section(
-        "Poles",
-        columns_of(("pole (1/s)", ("time constant", constant), ("frequency", frequency), ratio), rows),
-        panels=partial(frequency_panels, model),
-        name="frequency-response" if np.any(model.B[:, 0]) or np.any(model.D[:, 0]) else "",
-        caption=_FREQUENCY_CAPTION,
-        size=(5.4, 2.2),
-        title=title,
-    )
-
-
 def _loop(model: LinearModel) -> Section:
     """Return the table of the margins of the loop with the scenario's PID, or the reason why there is none."""
     margins, controller = model.margins, model.scenario.controller
     if margins is None:
-        reason = "the command is clipped, or has no effect"
-        if controller.kind not in PID_LAWS:
-            reason = f"controller '{controller.kind}' is not a PID"
+        is_pid = controller.kind in PID_LAWS
+        reason = (
+            "the command is clipped, or has no effect" if is_pid else f"controller '{controller.kind}' is not a PID"
+        )
         return Section(remarks=[f"no stability margins: {reason}"])
     frequency, angle = Kind(quantity="frequency", form=".3g"), Kind(quantity="angle", form=".3g")
     gain = margins.gain_margin or 1.0
-    values = (
+    rows = [("closed loop", "stable" if margins.is_stable else "unstable")]
+    for name, text, at in (
         ("gain margin", f"{gain:.3g} ({20.0 * np.log10(gain):.3g} dB) at ", margins.phase_crossover),
         ("phase margin", f"{angle.text(margins.phase_margin or 0.0)} at ", margins.gain_crossover),
         ("bandwidth (-3 dB)", "", margins.bandwidth),
-    )
-    # A sampled loop is real at half the sample rate: its phase may meet -180 deg there alone.
-    end = (1.0 - _REAL) * 0.5 / controller.period
-    only = ", half the sample rate: the phase reaches -180 deg only there"
-    none = "none below half the sample rate"
-    rows = [("closed loop", "stable" if margins.is_stable else "unstable")]
-    rows += [
-        (name, none if at is None else f"{text}{frequency.text(at)}{only if at >= end else ''}")
-        for name, text, at in values
-    ]
+    ):
+        found = "none below half the sample rate" if at is None else f"{text}{frequency.text(at)}"
+        # A sampled loop is real at half the sample rate: its phase may meet -180 deg there alone.
+        if at == margins.frequencies[-1]:
+            found += ", half the sample rate: the phase reaches -180 deg only there"
+        rows.append((name, found))
     rows.append(("peak sensitivity", f"{margins.peak_sensitivity:.3g}"))
     return Section("Loop with the PID of the scenario for small changes, sampled and with its delays", facts(rows))
 
 
 def frequency_panels(model: LinearModel) -> list[Panel]:
     """Return panels of the open loop with its margins, if any, and of the frequency response of torque to command."""
-    poles, margins = np.abs(model.poles) / (2.0 * np.pi), model.margins
+    poles, margins, delays = np.abs(model.poles) / (2.0 * np.pi), model.margins, model.delays
     found = () if margins is None else (margins.gain_crossover, margins.phase_crossover, margins.bandwidth)
     # All frequencies that the report names, and half the sample rate, where a loop ends.
-    lowest = _LOWEST_SHARE * min((1.0, *poles[poles > 0.0].tolist(), *(at for at in found if at)))
-    highest = max(_HIGHEST, 0.0 if margins is None else 0.5 / model.delays.period)
-    frequencies = np.geomspace(lowest, highest, _DRAWN_POINTS)
-    response, delay = (
-        model.response(frequencies),
-        model.delays.command + model.delays.signals + 0.5 * model.delays.period,
-    )
-    phase = np.degrees(np.unwrap(np.angle(response)))
-    delayed = f"with {1.0e3 * delay:.3g} ms of dead time, late measurements and half a sample"
+    lowest = 0.1 * min((1.0, *poles[poles > 0.0].tolist(), *filter(None, found)))
+    highest = max(100.0, 0.0 if margins is None else 0.5 / delays.period)
+    frequencies = np.geomspace(lowest, highest, 400)
+    response, delay = model.response(frequencies), delays.command + delays.signals + 0.5 * delays.period
 
-    def panel(kind: Kind, marks: list[Mark], legend: str = "above", **scales: Any) -> Panel:
-        def set_axes(axes: "Axes") -> None:
-            from matplotlib.ticker import MultipleLocator
+    def panel(kind: Kind, marks: list[Mark], **scales: Any) -> Panel:
+        limits = {"xscale": "log", "xlim": (lowest, 1.1 * highest), **scales}
+        frequency, then = Kind("Frequency", "Hz"), methodcaller("set", **limits)
+        return Panel(frequency, kind, marks, legend="inside", then=then, shares_x=True)
 
-            axes.set(xscale="log", xlim=(lowest, 1.1 * highest), **scales)
-            if "ylim" in scales:
-                axes.yaxis.set_major_locator(MultipleLocator(45.0))
-
-        return Panel(_FREQUENCY, kind, marks, legend=legend, then=set_axes, shares_x=True)
-
-    panels, loop = [], open_loop(model)
-    if loop is not None and margins is not None:
-        is_drawn = loop[0] >= lowest
-        at_loop, drawn = (values[is_drawn][_LOOP_POINTS][::-1] for values in loop)
-        phases = np.degrees(np.unwrap(np.angle(drawn)))
+    panels = []
+    if margins is not None:
+        at = margins.frequencies[::-20][::-1]
+        at, loop = at[at >= lowest], margins.loop[::-20][::-1][at >= lowest]
+        phases = np.degrees(np.unwrap(np.angle(loop)))
         # Where a margin is read: from the dot to the dashed line, the nearest of the whole turns.
-        critical = -180.0 + 360.0 * round((phases[-1] + 180.0) / 360.0)
-        crossovers = (
-            (margins.gain_crossover, "phase margin", VERMILION, "o"),
-            (margins.phase_crossover, "gain margin", BLACK, "s"),
-        )
+        turned = np.interp(margins.phase_crossover or at[-1], at, phases)
+        critical = -180.0 + 360.0 * round((turned + 180.0) / 360.0)
         for kind, curve, level, scale in (
-            (Kind("Open-loop gain"), np.abs(drawn), 1.0, "log"),
+            (Kind("Open-loop gain"), np.abs(loop), 1.0, "log"),
             (Kind("Open-loop phase", "deg"), phases, critical, "linear"),
         ):
-            ends = Mark("line", at_loop[[0, -1]], np.full(2, level), (), "", GREY, _DASHED)
-            dots = [
-                Mark(
-                    "line",
-                    np.array([at]),
-                    np.array([np.interp(at, at_loop, curve)]),
-                    label=f"{name} at {at:.3g} Hz",
-                    colour=colour,
-                    style={"linestyle": "", "marker": marker, "markersize": 5},
-                )
-                for at, name, colour, marker in crossovers
-                if at is not None and at >= lowest
-            ]
-            panels.append(panel(kind, [Mark("line", at_loop, curve), ends, *dots], "inside", yscale=scale))
+            marks = [Mark("line", at, curve), Mark("level", (), level, colour=GREY, style=_DASHED)]
+            for crossover, name, colour, marker in (
+                (margins.gain_crossover, "phase margin", VERMILION, "o"),
+                (margins.phase_crossover, "gain margin", BLACK, "s"),
+            ):
+                if crossover is not None:
+                    place, label = np.array([crossover]), f"{name} at {crossover:.3g} Hz"
+                    marks.append(dots(place, np.interp(place, at, curve), marker, label, colour, markersize=5))
+            panels.append(panel(kind, marks, yscale=scale))
+    phase = np.degrees(np.unwrap(np.angle(response)))
+    delayed = f"with {1.0e3 * delay:.3g} ms of dead time, late measurements and half a sample"
     late = Mark("line", frequencies, phase - 360.0 * frequencies * delay, (), delayed, VERMILION, _DASHED)
-    ends_of_phase = (max(-360.0, float(np.min(phase)) - 90.0), float(np.max(phase)) + 20.0)
+    shown = (max(-360.0, phase.min() - 90.0), phase.max() + 20.0)
+    degrees = np.arange(-360.0, 181.0, 45.0)
     return [
         *panels,
         panel(Kind("Torque per command", "N m"), [Mark("line", frequencies, np.abs(response))], yscale="log"),
         panel(
-            Kind("Phase", "deg"), [Mark("line", frequencies, phase, label="plant"), late], "inside", ylim=ends_of_phase
+            Kind("Phase", "deg"), [Mark("line", frequencies, phase, label="plant"), late], yticks=degrees, ylim=shown
         ),
     ]
 
@@ -1016,7 +889,7 @@ def frequency_panels(model: LinearModel) -> list[Panel]:
 # Range of validity: steps of the command from the steady state, on the runs and of the model.
 
 
-def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> tuple[Floats, Floats, Floats]:
+def steps_of(model: LinearModel, shares: tuple[float, ...] = _SHARES) -> tuple[Floats, Floats, Floats]:
     """Return step heights of the command [-] (steps,), and torque changes of runs and model [N m] (steps, times).
 
     The steps are fractions of the steady command; the ankle must be locked, and gas pressures the only states.
@@ -1026,41 +899,38 @@ def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> tuple[Fl
     command, run = model.values["command"], model.scenario.run
     held = replace(
         model.scenario,
-        run=replace(run, duration=DURATION, step=INTERVAL, output_interval=INTERVAL),
+        run=replace(run, duration=1.0, step=_INTERVAL, output_interval=_INTERVAL),
         initial=replace(model.scenario.initial, **{name: model.values[name] for name in model.states}),
     )
     laws = (
-        Control(switching.CONSTANT.name, {"command": command * (1.0 + share)}, INTERVAL) for share in (0.0, *shares)
+        Control(switching.CONSTANT.name, {"command": command * (1.0 + share)}, _INTERVAL) for share in (0.0, *shares)
     )
     results = simulate_many([with_control(held, law) for law in laws])
     still, *runs = (result.recording["torque"] for result in results)
     amplitudes: Floats = command * np.array(shares, dtype=np.float64)
     # The command is the first input, the torque the first output.
     plant = StateSpace(model.A, model.B[:, :1], model.C[:1], model.D[:1, :1])
-    return amplitudes, np.array(runs) - still, amplitudes[:, None] * step(plant, T=INTERVAL * np.arange(still.size))[1]
+    return amplitudes, np.array(runs) - still, amplitudes[:, None] * step(plant, T=_INTERVAL * np.arange(still.size))[1]
 
 
 def steps_panels(model: LinearModel) -> list[Panel]:
     """Return panels of step responses, nonlinear and linear, and of their difference divided by the amplitude."""
     amplitudes, runs, linear = steps_of(model)
-    times, over_time = INTERVAL * np.arange(runs.shape[1]), []
-    for number, colour in zip(_DRAWN_STEPS, (BLUE, VERMILION), strict=True):
-        label = f"command {100.0 * SHARES[number]:+.3g} %"
-        over_time.append(Mark("line", times, runs[number] / amplitudes[number], label=label, colour=colour))
+    times = _INTERVAL * np.arange(runs.shape[1])
+    # The middle of the three decades, and the largest step.
+    over_time = [
+        Mark("line", times, runs[row] / amplitudes[row], (), f"command {100.0 * _SHARES[row]:+.3g} %", colour)
+        for row, colour in ((-5, BLUE), (-1, VERMILION))
+    ]
     over_time.append(Mark("line", times, linear[-1] / amplitudes[-1], (), "linear", BLACK, _DASHED))
     errors, sizes = (np.max(np.abs(changes), axis=1) for changes in (runs - linear, runs))
-    square = errors[0] * (sizes / sizes[0]) ** 2
-    dots = {"linestyle": "", "marker": "o", "markersize": 4}
-    per_command = Kind("Change of torque per command", "N m")
+    square = Mark("line", sizes, errors[0] * (sizes / sizes[0]) ** 2, (), "square of the amplitude", GREY, _DASHED)
     return [
-        Panel(replace(TIME, words="Time after the step"), per_command, over_time),
+        Panel(replace(TIME, words="Time after the step"), Kind("Change of torque per command", "N m"), over_time),
         Panel(
             Kind("Largest change of torque in a step", "N m"),
             Kind("Runs less linear model", "N m"),
-            [
-                Mark("line", sizes, errors, label="largest difference", style=dots),
-                Mark("line", sizes, square, (), "square of the amplitude", GREY, _DASHED),
-            ],
-            then=lambda axes: axes.set(xscale="log", yscale="log"),
+            [dots(sizes, errors, "o", "largest difference", markersize=4), square],
+            then=methodcaller("set", xscale="log", yscale="log"),
         ),
     ]

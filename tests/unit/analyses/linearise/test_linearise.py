@@ -303,8 +303,7 @@ def test_margins_and_crossover_are_those_of_loop_shaping() -> None:
     finding = linearise(TASK, overrides=[*HOLD, *gains])
     margins = finding.found.margins
     assert margins is not None
-    assert margins.phase_margin is not None
-    assert math.degrees(margins.phase_margin) == pytest.approx(79.2, abs=0.1)
+    assert math.degrees(margins.phase_margin or 0.0) == pytest.approx(79.2, abs=0.1)
     assert margins.gain_crossover == pytest.approx(5.107, abs=1e-3)
     assert "phase margin       79.2 deg at 5.11 Hz" in text_of(finding)
     assert "no stability margins: controller 'constant' is not a PID" in text_of(linearise("step-response"))
@@ -316,12 +315,14 @@ def test_margins_and_crossover_are_those_of_loop_shaping() -> None:
     at = {mark.label: (mark.x[0], mark.y[0]) for mark in gain.marks[2:]}
     assert at["phase margin at 5.11 Hz"] == pytest.approx((margins.gain_crossover, 1.0), rel=1e-3)
     assert at["gain margin at 500 Hz"] == pytest.approx((500.0, 1.0 / margins.gain_margin), rel=1e-3)
-    assert phase.marks[2].y[0] - phase.marks[1].y[0] == pytest.approx(79.2, abs=0.1)
+    assert phase.marks[2].y[0] - phase.marks[1].y == pytest.approx(79.2, abs=0.1)
+    # With dead time the phase goes on for more than a turn beyond the crossover.
+    late = frequency_panels(linear("torque-task-slow-valve", "0.5 s"))[1].marks
+    assert late[3].y[0] == pytest.approx(late[1].y, abs=0.5)
     assert len(frequency_panels(linear("step-response"))) == 2
     # Of the two integrators of two sealed chambers the loop has one.
-    sealed = linear(TASK, overrides=[*HOLD, "actuator.leak.area=0 mm^2"]).margins
-    assert sealed is not None
-    assert sealed.is_stable
+    sealed = linear(TASK, overrides=[*HOLD, "actuator.leak.area=0 mm^2"])
+    assert sealed.margins.is_stable  # type: ignore[union-attr]
 
 
 def test_a_pressure_loop_has_an_equilibrium_at_its_reference() -> None:
@@ -330,5 +331,4 @@ def test_a_pressure_loop_has_an_equilibrium_at_its_reference() -> None:
         assert model.values[controlled] == pytest.approx(
             3e5 + model.scenario.device.supply.atmospheric_pressure, rel=1e-9
         )
-        assert model.margins is not None
-        assert model.margins.is_stable
+        assert model.margins.is_stable  # type: ignore[union-attr]

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.analyses.linearise.model import linear_model, model_at, plant_of, point_at, valve_states
+from ppafo.analyses.linearise.model import linear_model, model_at, plant_of, values_after, valve_states
 from ppafo.loading import load_scenario
 from ppafo.running import simulate
 from ppafo.simulation.plan import plan_run
@@ -72,9 +72,9 @@ def test_a_load_has_the_slopes_of_its_formula_on_every_actuator() -> None:
         texts = [*overrides, "run.duration=0.1 s"]
         plain = load_scenario(ACTUATORS / f"{name}.toml", texts)
         loaded = load_scenario(ACTUATORS / f"{name}.toml", [*texts, *load])
-        point = point_at(plain, AT)
-        without, model = (model_at(scenario, plan_run(scenario), point) for scenario in (plain, loaded))
-        inertia, rate = plan_run(plain).plant.inertia, point.values["angular_velocity"]
+        point = values_after(plain, run := plan_run(plain), round(AT / plain.run.step))
+        without, model = (model_at(scenario, plan_run(scenario), point, AT) for scenario in (plain, loaded))
+        inertia, rate = run.plant.inertia, point["angular_velocity"]
         row, by_angle = model.states.index("angular_velocity"), model.states.index("angle")
         more = (model.A - without.A)[row]
         assert more[by_angle] == pytest.approx(-8.0 / inertia, rel=1e-4), case
