@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -75,8 +75,6 @@ _ABOVE_FREEZING = 0.02
 """Temperature [K] above the cold end of the property table at which a run stops, to stay within the table."""
 _BALANCE = ("drawn_mass", "outflow_energy", "room_heat", "mass_change", "content_energy_change", "wall_energy_change")
 """Mass [kg] and energy [J] across the boundary, and their changes inside."""
-_Stop = Literal["supply", "frozen", "time"]
-"""Reason for the end of a discharge: supply pressure lost, cold end of the property table, or time limit."""
 
 
 @dataclass(frozen=True)
@@ -141,21 +139,6 @@ class Endurance:
         }
 
 
-class _Interval(NamedTuple):
-    """Interval of a discharge with a constant gas flow ``draw`` [kg/s]; ``stopped_by`` is the reason of an early end.
-
-    The state is mass [kg] and energy [J] of the content, temperature of the wall [K], and the cumulative gas [kg],
-    enthalpy [J] and heat from the room [J] across the boundary.
-    """
-
-    start: float
-    end: float
-    draw: float
-    solution: Callable[[Any], Any]
-    last: Floats
-    stopped_by: _Stop | None
-
-
 def discharge(
     bottle: Bottle,
     mass_per_stride: float,
@@ -179,18 +162,23 @@ def discharge(
         )
     energy = content_energy(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
     start = np.array([bottle.mass, energy, bottle.room_temperature, 0.0, 0.0, 0.0])
-    intervals: list[_Interval] = []
-    time, values, walking = 0.0, start, True
-    reason: _Stop | None = None
-    while reason is None:
+    intervals = list[tuple[float, Any]]()
+    time, values, walking, reason = 0.0, start, True, ""
+    while not reason:
         # Walking and resting take turns; without a rest there is one interval.
         length = schedule.longest if schedule.rest == 0.0 else (schedule.walk if walking else schedule.rest)
         end, flow = min(time + length, schedule.longest), mean_flow * walking
-        interval = _solve_interval(bottle, flow, peak_flow, time, end, values)
-        intervals.append(interval)
-        time, values, walking = interval.end, interval.last, not walking
-        reason = interval.stopped_by or ("time" if time >= schedule.longest else None)
-    walked = sum(interval.end - interval.start for interval in intervals if interval.draw > 0.0)
+        # An interval may begin without a reserve, and the solver finds crossings only.
+        if intervals and walking and min(reserves(bottle, peak_flow, content_of(bottle, values))) <= 0.0:
+            break
+        solution = _solve_interval(bottle, flow, peak_flow, time, end, values)
+        intervals.append((flow, solution))
+        time, values, walking = float(solution.t[-1]), np.asarray(solution.y[:, -1]), not walking
+        if solution.status == 1:
+            reason = "frozen" if len(solution.t_events[0]) else "short"
+        elif time >= schedule.longest:
+            reason = "time"
+    walked = sum(float(solution.t[-1]) - float(solution.t[0]) for flow, solution in intervals if flow > 0.0)
     mass, needed = float(values[0]), smallest_mass_when_warm(bottle, peak_flow)
     usable, change, wall = max(0.0, mass - needed), (values - start).tolist(), bottle.wall
     remaining = f"{mass * GRAMS_PER_KILOGRAM:.3g} g are left"
@@ -267,15 +255,18 @@ def smallest_mass_when_warm(bottle: Bottle, peak_flow: float, enough: float = ma
     return high
 
 
-def _recording(bottle: Bottle, intervals: Sequence[_Interval]) -> Recording:
-    """Return the recording of a discharge at uniformly spaced times, from the start to the exact end."""
-    times = np.linspace(0.0, intervals[-1].end, SAMPLES)
-    ends = np.array([interval.end for interval in intervals])
+def _recording(bottle: Bottle, intervals: Sequence[tuple[float, Any]]) -> Recording:
+    """Return the recording of a discharge at uniformly spaced times, from the start to the exact end.
+
+    ``intervals`` are the gas flows [kg/s] and the solutions of walking and rest in turn.
+    """
+    ends = np.array([float(solution.t[-1]) for _, solution in intervals])
+    times = np.linspace(0.0, ends[-1], SAMPLES)
     # The last time may be beyond the last end by rounding.
     numbers = np.minimum(np.searchsorted(ends, times, side="left"), len(intervals) - 1)
-    rows = np.array([intervals[number].solution(time) for number, time in zip(numbers, times, strict=True)])
+    rows = np.array([intervals[number][1].sol(time) for number, time in zip(numbers, times, strict=True)])
     contents = [content_of(bottle, row) for row in rows]
-    flows = [intervals[number].draw for number in numbers]
+    flows = [intervals[number][0] for number in numbers]
     pressures = [content.pressure for content in contents]
     channels = {
         "bottle_mass": (rows[:, 0], "kg"),
@@ -297,10 +288,13 @@ def content_of(bottle: Bottle, values: Floats) -> BottleContent:
     return bottle_content(table, mass, bottle.volume, content_temperature(table, mass, bottle.volume, energy))
 
 
-def _solve_interval(
-    bottle: Bottle, flow: float, peak_flow: float, start: float, end: float, values: Floats
-) -> _Interval:
-    """Simulate one interval of walking or, without flow, of rest; walking ends early if the supply pressure is lost."""
+def _solve_interval(bottle: Bottle, flow: float, peak_flow: float, start: float, end: float, values: Floats) -> Any:
+    """Return SciPy's solution of an interval of walking or, without flow, of rest, from ``start`` to ``end`` [s].
+
+    It ends early at the cold end of the property table and, in walking, where the supply pressure is lost. The state is
+    mass [kg] and energy [J] of the content, temperature of the wall [K], and the cumulative gas [kg], enthalpy [J] and
+    heat from the room [J] across the boundary.
+    """
     from scipy.integrate import solve_ivp
 
     def rates(_time: float, y: Floats) -> list[float]:
@@ -316,9 +310,6 @@ def _solve_interval(
     def to_spare(_time: float, y: Floats) -> float:
         return min(reserves(bottle, peak_flow, content_of(bottle, y)))
 
-    # An interval may begin without a reserve, and the solver finds crossings only.
-    if flow > 0.0 and to_spare(start, values) <= 0.0:
-        return _Interval(start, start, flow, lambda _times: values, values, "supply")
     events: list[Any] = [kelvins_above_freezing, *([to_spare] if flow > 0.0 else [])]
     for event in events:
         # It ends the interval where it falls through 0.
@@ -328,9 +319,7 @@ def _solve_interval(
     )
     if solution.status < 0:
         raise SimulationError(f"the simulation of the bottle failed at {solution.t[-1]:.4g} s: {solution.message}")
-    stopped: _Stop = "frozen" if len(solution.t_events[0]) else "supply"
-    last = np.asarray(solution.y[:, -1])
-    return _Interval(start, float(solution.t[-1]), flow, solution.sol, last, stopped if solution.status == 1 else None)
+    return solution
 
 
 # Gas use of a walk and of a recording, and the report.
