@@ -23,8 +23,8 @@ from ppafo.remedy_trials import verdict_of
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
-from ppafo.simulation.tracking.case import Case
 from ppafo.simulation.tracking.load_causes import _supplies_for
+from ppafo.simulation.tracking.remedies import Case
 from ppafo.simulation.tracking.rule import available_torque
 
 LOCKED = {"kind": "locked", "angle": "75 deg"}

@@ -20,8 +20,8 @@ from ppafo.engine.run import Run
 from ppafo.engine.scheme.actuators import pressures_of, volumes_of
 from ppafo.errors import SimulationError
 from ppafo.signals.recording import Recording
-from ppafo.simulation.at_hand import RecordedResult
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import RecordedResult
 from ppafo.units.shown import in_units, units_in_force
 from ppafo.wording import without_exponent
 

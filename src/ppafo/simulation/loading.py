@@ -14,10 +14,9 @@ from ppafo.errors import KindError, ScenarioError, noted_in, raise_noted, refuse
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.declared import KIND, Content, layout_of, value_at
 from ppafo.parameters.overrides import FORMS, Override, either, in_two_forms, read_overrides
-from ppafo.simulation.building import build_scenario
+from ppafo.simulation.building import build_scenario, read_hardware
 from ppafo.simulation.declaration import OF_A_VANE
 from ppafo.simulation.document import DocumentReader
-from ppafo.simulation.hardware import read_hardware
 from ppafo.simulation.numbers import check_parts
 from ppafo.simulation.overrides import override_document
 from ppafo.simulation.scenario import Origin, Scenario

@@ -17,12 +17,19 @@ from ppafo.parameters.declared import kind_at, value_at
 from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.overrides import read_overrides
 from ppafo.plugins import Plugins
-from ppafo.simulation.building import assumed_lines, origin_of, read_gas_model, read_supply_line, with_settings
+from ppafo.simulation.building import (
+    assumed_lines,
+    origin_of,
+    read_device,
+    read_gas_model,
+    read_hardware,
+    read_supply_line,
+    with_settings,
+)
 from ppafo.simulation.clock import read_period
 from ppafo.simulation.contradictions import check_contradictions
 from ppafo.simulation.declaration import SUPPLY_LINE
 from ppafo.simulation.document import DocumentReader
-from ppafo.simulation.hardware import read_device, read_hardware
 from ppafo.simulation.loading import FILE as SCENARIO_FILE
 from ppafo.simulation.loading import Layout, list_scenarios, request_again, request_of_file, scenario_of
 from ppafo.simulation.motion_kind import WALK

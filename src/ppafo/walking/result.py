@@ -15,11 +15,10 @@ from ppafo.engine.lanes import Floats
 from ppafo.metrics import Metric
 from ppafo.parameters.graph import Asked
 from ppafo.signals import Recording
-from ppafo.simulation.at_hand import RecordedResult, in_own_units
 from ppafo.simulation.default_gains import loop_parts
 from ppafo.simulation.numbers import changes_in, number_at
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import Status
+from ppafo.simulation.simulate import RecordedResult, Status, in_own_units
 from ppafo.simulation.tracking import Tracking, tracking_in
 from ppafo.simulation.tracking.remedies import level_text
 from ppafo.simulation.tracking.verdict import TOO_SHORT

@@ -18,7 +18,6 @@ from ppafo.simulation.gains import loop_of
 from ppafo.simulation.numbers import declared_numbers, number_at, with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.torque_loop import LoopParts, quicker_at
-from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.load_causes import (
     ACTS_ONE_WAY,
     ONE_WAY,
@@ -33,8 +32,10 @@ from ppafo.simulation.tracking.load_causes import (
 )
 from ppafo.simulation.tracking.remedies import (
     CASCADE,
+    Case,
     Change,
     Remedy,
+    TrackingCause,
     change_text,
     dead_band,
     default_gains,

@@ -18,10 +18,11 @@ from ppafo.parameters.reach import static_torque, supply_for, supply_that_moves,
 from ppafo.simulation.numbers import declared_numbers, number_at, of_its_chambers
 from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import FreeMotion, Scenario
-from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.remedies import (
+    Case,
     Change,
     Remedy,
+    TrackingCause,
     change_text,
     level_text,
     stated_number,

@@ -15,7 +15,7 @@ from ppafo.simulation.tracking.remedies import level_text
 from ppafo.simulation.tracking.rule import SMALLEST_MOVE
 
 if TYPE_CHECKING:
-    from ppafo.simulation.at_hand import RecordedResult
+    from ppafo.simulation.simulate import RecordedResult
 
 
 def remarks_on(result: "RecordedResult", follows: bool) -> Iterator[str]:

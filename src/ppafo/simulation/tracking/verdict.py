@@ -19,10 +19,9 @@ from ppafo.metrics.settled import (
 from ppafo.model.controlled import CONTROLLED
 from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.causes import causes_of_task, causes_of_walk
 from ppafo.simulation.tracking.load_causes import cuts_wave, torque_beyond_reach
-from ppafo.simulation.tracking.remedies import Remedy, change_text, rank
+from ppafo.simulation.tracking.remedies import Case, Remedy, TrackingCause, change_text, rank
 from ppafo.simulation.tracking.rule import (
     CRITERION_TEXTS,
     LARGEST_PEAK,
@@ -48,7 +47,7 @@ from ppafo.units.shown import in_units
 from ppafo.wording import override_text, without_exponent
 
 if TYPE_CHECKING:
-    from ppafo.simulation.at_hand import RecordedResult
+    from ppafo.simulation.simulate import RecordedResult
 
 _FEWEST_SAMPLES, _SAMPLES_ADVISED = 8, 100
 """Smallest number of samples of a recording for a verdict, and number of samples that a remedy gives it."""
