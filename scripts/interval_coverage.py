@@ -233,7 +233,7 @@ def one_of(cell: str, seed: int, number: int) -> One:
     seconds = time.process_time() - begun
     holds = [one.low <= true <= one.high for one, true in zip(found.estimates, truth, strict=True)]
     identified = [one.is_identified for one in found.estimates]
-    half = [one.half_width / true for one, true in zip(found.estimates, truth, strict=True)]
+    half = [one.wider_half_width / true for one, true in zip(found.estimates, truth, strict=True)]
     return One(holds=holds, identified=identified, is_flagged=bool(found.conflict), half_widths=half, seconds=seconds)
 
 

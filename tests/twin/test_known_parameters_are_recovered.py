@@ -24,7 +24,7 @@ def test_four_numbers_of_the_device_lie_in_their_intervals_beside_all_tolerances
     assert found.conflict == ""
     for estimate, truth in zip(found.estimates, SOUGHT.values(), strict=True):
         # Four standard errors on either side.
-        assert abs(estimate.value - truth) < 4.0 / 1.96 * estimate.half_width, estimate
+        assert abs(estimate.value - truth) < 4.0 / 1.96 * estimate.wider_half_width, estimate
         # Noise that wanders hides the break-away of this vane: half of the interval of its friction is as wide as the
         # value, most of it by the tolerance of the Stribeck velocity, and the fit may say that it sees nothing of it.
         hidden = cell == "AR(1)" and estimate.path == "friction.static_torque"

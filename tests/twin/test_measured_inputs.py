@@ -52,7 +52,7 @@ def test_true_values_are_found_where_the_run_follows_the_recorded_supply(folder:
     supply = found.problem.experiments[0].recording["supply_pressure"]
     assert np.ptp(supply) > 3.0e4
     for path, true in TRUTH.items():
-        assert found.values[path] == pytest.approx(true, rel=5e-3), path
+        assert found[path].value == pytest.approx(true, rel=5e-3), path
     assert max(channel.rms / channel.span for channel in found.channels) < 2e-3
 
 

@@ -83,7 +83,7 @@ def test_the_right_model_is_no_misfit_where_its_step_lies_inside_the_recording(f
     assert outcome is not None
     assert outcome.conflict == ""
     for path, truth in TRUTH.items():
-        found = outcome.estimate(path)
+        found = outcome[path]
         assert found.verdict == "identified"
         # With a start taken from the samples at rest as exactly known, separate fits lowered the misfit by 97 of 5.
         assert abs(found.value - truth) < found.high - found.low

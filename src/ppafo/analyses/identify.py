@@ -378,24 +378,20 @@ def trajectory_panels(measurement: Recording, model: Recording) -> list[ask.Pane
     """Return samples, model at the same times and residuals of one experiment: two panels for each fitted channel."""
     from ppafo.report.residuals import FittedCurve, course_panels
     from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
+    from ppafo.validation.settings import COMPARED
 
     origins = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
-    panels: list[ask.Panel] = []
-    for name, kind, style, change in (
-        ("angle", ask.Kind("Vane angle", "rad", "angle"), ACTUAL, "angle"),
-        ("pressure_1", ask.Kind("Pressure in chamber 1", "Pa_a", "pressure"), CHAMBER_1, "pressure change"),
-        ("pressure_2", ask.Kind("Pressure in chamber 2", "Pa_a", "pressure"), CHAMBER_2, "pressure change"),
-    ):
-        if name in measurement:
-            curve = FittedCurve(
-                time=ask.TIME,
-                level=kind,
-                change=ask.Kind("Residual (measured - model)", quantity=change),
-                times=measurement.time,
-                samples=measurement[name],
-                model=model[name],
-                names=(origins[measurement.kind], "model"),
-                colour=style.colour,
-            )
-            panels += course_panels(curve, "circles", "" if panels else "above")
+    panels, looks = list[ask.Panel](), {"pressure_1": CHAMBER_1, "pressure_2": CHAMBER_2}
+    for name, channel in ((name, channel) for name, channel in COMPARED.items() if name in measurement):
+        curve = FittedCurve(
+            time=ask.TIME,
+            level=ask.Kind(channel.title, "", "pressure" if name in looks else channel.quantity),
+            change=ask.Kind("Residual (measured - model)", "", channel.quantity),
+            times=measurement.time,
+            samples=measurement[name],
+            model=model[name],
+            names=(origins[measurement.kind], "model"),
+            colour=looks.get(name, ACTUAL).colour,
+        )
+        panels += course_panels(curve, "circles", "" if panels else "above")
     return panels

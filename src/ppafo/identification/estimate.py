@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING, Literal
 
 from ppafo.units import split_pressure_kind
 from ppafo.units.shown import shown_unit, shown_value
-from ppafo.wording import percentage
+from ppafo.wording import percentage, without_exponent
 
 if TYPE_CHECKING:
     from ppafo.signals import RecordingKind
 
 _DIFFERENCES = {"Pa": "Pa_d"}
 """Unit of a difference by SI unit."""
-_SMALLEST, _LARGEST = 1.0e-2, 1.0e5
-"""Range of magnitudes written without a power of ten."""
 _NOTHING, _NEAREST = 1.0e-6, 0.05
 """Fraction of an error [-] that is rounding, and least distance of an end from its value that sets digits [values]."""
 NAMED = 2
@@ -64,12 +62,8 @@ def digits_of(number: float, error: float) -> str:
         return f"{number:.4g}"
     if abs(number) <= _NOTHING * error:
         return "0"
-    decimals = 1 - math.floor(math.log10(error))
-    if round(number, decimals) == 0.0:
-        return f"{number:.2g}"
-    if _SMALLEST <= max(abs(number), error) < _LARGEST:
-        return f"{round(number, decimals):.{max(decimals, 0)}f}"
-    return f"{number:.{max(math.floor(math.log10(abs(number))) + decimals, 1)}e}"
+    digits = 2 + math.floor(math.log10(abs(number))) - math.floor(math.log10(error))
+    return without_exponent(number, f"#.{max(digits, 2)}g").removesuffix(".")
 
 
 def interval_texts(value: float, low: float, high: float) -> tuple[str, str, str]:
@@ -149,11 +143,6 @@ class Estimate:
         return f"{self.verdict}, +-{percentage(width, 2)}"
 
     @property
-    def half_width(self) -> float:
-        """Half-width of the confidence interval [``unit``]."""
-        return (self.high - self.low) / 2.0
-
-    @property
     def wider_half_width(self) -> float:
         """Width [``unit``] of the wider side of the interval; a side cut off at zero is too narrow."""
         return max(self.high - self.value, self.value - self.low)
@@ -185,8 +174,3 @@ class Identified:
     def __getitem__(self, path: str) -> Estimate:
         """Return the estimate at a path. Raises KeyError if there is none."""
         return {estimate.path: estimate for estimate in self.estimates}[path]
-
-    @property
-    def values(self) -> dict[str, float]:
-        """Estimated values by path [SI]."""
-        return {estimate.path: estimate.value for estimate in self.estimates}

@@ -1,11 +1,10 @@
 """Estimator: bounded least squares with whitened residuals, confidence intervals, and tests of the model.
 
 Bench procedures and the trajectory fit use the same ``fit``; uncertain quantities are variables with a prior. Variables
-are scaled; residuals are divided by the noise of their channel, which is estimated from the residuals. The step of each
-finite difference changes all residuals together by three units of noise. For a linear law the covariance gives the
-limits of an interval. For a nonlinear law, such as one in which only a product of two variables counts, distant values
-may explain the recordings as well: a limit is the value at which the minimum of the squares over all other variables is
-larger by t^2, with Student's factor t (profile likelihood).
+are scaled; residuals are divided by the noise of their channel, which is estimated from the residuals. For a linear law
+the covariance gives the limits of an interval. For a nonlinear law, such as one in which only a product of two
+variables counts, distant values may explain the recordings as well: a limit is the value at which the minimum of the
+squares over all other variables is larger by t^2, with Student's factor t (profile likelihood).
 """
 
 import math
@@ -43,21 +42,19 @@ Differences of a thousandth of the variable, or of thirty units of noise, gave f
 _SHORTEST_STEP, _LONGEST_STEP = 1.0e-7, 1.0e-3
 """Shortest and longest finite difference, as fractions of the scale of a variable [-]."""
 _LEAST_NOISE = 1.0e-12
-"""Least noise of a channel, relative to its largest residual at the start [-], for a law that fits exactly."""
+"""Least noise of a channel [largest residuals at the start], for a law that fits exactly."""
 _OF_ANY_SIZE = 1.0e8
 """Standard deviation of an error of unknown magnitude, relative to the noise [-]."""
-_ROUNDS = 20
-"""Largest number of iterations between noise and variables; most fits converge in a few."""
-_SHORT = 0.1
-"""Shortest fraction of a step that is tried [-], from which its curvature is found too."""
-_SHARES = np.array([1.0, 0.5, 0.25])[:, None]
-"""Longer fractions of a step [-]; the best is taken."""
+_ROUNDS, _EVALUATIONS, _GAUSS_NEWTON, _TRIES, _STEPS = 20, 40, 40, 10, 12
+"""Largest numbers of iterations between noise and variables, of evaluations in each pass of the search, of steps on
+whitened samples, of trial points per limit, and of steps of the other variables at each.
+"""
+_SHORT, _SHARES = 0.1, np.array([1.0, 0.5, 0.25])[:, None]
+"""Shortest fraction of a step, from which its curvature is found too, and the longer ones; the best is taken [-]."""
 _STILL = 1.0e-3
 """Change of the step between iterations [standard errors] at which noise and variables agree."""
 _RANK = 1.0e-13
 """Least eigenvalue of the scaled curvature [-] for a direction to be observable."""
-_TRIES, _STEPS = 10, 12
-"""Largest numbers of trial points per limit, and of Gauss-Newton steps of the other variables at each."""
 _SETTLED = 0.02
 """Decrease of the squares [-] below which the other variables have converged."""
 _CLOSE = 0.01
@@ -71,42 +68,32 @@ _SMOOTHEST = 0.15
 
 Noise with a lag of 33 samples, 0.24, is estimated down to 0.19 in two recordings of 500 samples.
 """
-_SIGNIFICANCE = 0.01
-"""Significance level [-] of a difference between estimates."""
-_BY_CHANCE = 0.001
-"""Significance level [-] of residuals that follow each other, about 3.1 standard errors of their correlation."""
+_SIGNIFICANCE, _BY_CHANCE = 0.01, 0.001
+"""Significance levels of a difference between estimates, and of residuals that follow each other (3.1 errors) [-]."""
 _PARTING = 0.05
 """Smallest relative excess of a group's variance over the common variance [-] for a direction to be tested."""
-_LEFT_OUT = 0.01
-"""Largest fraction of samples left out [-], for outliers and for samples affected by an event such as an impact."""
-_LEVERAGE = 0.1
-"""Leverage of a single sample [-] above which the sample is left out."""
-_EVALUATIONS = 40
-"""Largest number of residual evaluations in each pass of the search."""
+_LEFT_OUT, _LEVERAGE = 0.01, 0.1
+"""Largest fraction of samples left out, as outliers or for their leverage, and the leverage above which one is [-]."""
 _ROUGH, _FINE = 1.0e-3, 1.0e-4
 """Relative decrease of the squares [-] that ends the robust pass of the search, and the second pass."""
-_GAUSS_NEWTON = 40
-"""Largest number of Gauss-Newton steps on whitened samples."""
-_GAIN = 1.0e-4
-"""Decrease of the squares [-] below which a point is their minimum: a hundredth of a standard error."""
-_CONVERGED = 0.5
-"""Decrease of the squares in the last step [-] below which the search has converged within the standard errors."""
+_GAIN, _CONVERGED = 1.0e-4, 0.5
+"""Decreases of the squares [-] below which a point is their minimum, and the search has converged to its errors."""
 _AT_BOUND = 1.0e-6
 """Largest distance of a variable from its bound [-] that counts as at the bound, relative above 1."""
+_WIDEST = 12.0
+"""Largest deviation of a tolerance in the search [scales]."""
 _UNDETERMINED = 0.5
 """Standard error of a combination of relative variables [-] above which it is not identifiable."""
-_SHOWN_WEIGHT = 0.1
-"""Least weight of a variable in a combination [-] for which it is listed."""
-_OWN_SHARE = 0.2
-"""Weight in an undetermined combination [-] from which a number itself counts as not identifiable."""
+_SHOWN_WEIGHT, _OWN_SHARE = 0.1, 0.2
+"""Least weight of a variable in such a combination [-] for which it is listed, and counts as not identifiable."""
 _NEAR = 1.0e-3
 """Distance from a bound [widths of the interval] up to which an estimate counts as at its bound."""
 _NONE = 0.1
 """Upper end of an interval that begins at zero [typical magnitudes], below which the part is none."""
-_BETTER = 1.0
-"""Increase of the log-likelihood [-] above which another start replaces the result; equal optima do not."""
-_OTHER_STARTS = 32
-"""Number of additional start points tried if the first fit is inconsistent or has not converged."""
+_BETTER, _OTHER_STARTS = 1.0, 32
+"""Number of other starts for a fit that is inconsistent or has not converged, and the increase of the log-likelihood
+[-] above which one replaces it; equal optima do not.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +134,26 @@ class FitNumber:
         return not self.recordings or label in self.recordings
 
 
+def tolerance(
+    path: str,
+    deviation: float,
+    start: float = 0.0,
+    scale: float = math.sqrt(3.0),
+    recordings: tuple[str, ...] = (),
+    family: str = "",
+) -> tuple[FitNumber, ...]:
+    """Return a variable with a prior of standard deviation ``deviation`` about ``start`` [SI]; nothing if exact.
+
+    Variables of one ``family`` are tested together. The ``scale`` of the search [deviations] is the limit by default,
+    so that a step of one scale is a likely one.
+    """
+    if not deviation > 0.0:
+        return ()
+    width = _WIDEST * (scale * deviation)
+    ends = start - width, start + width
+    return (FitNumber(path, start, *ends, scale * deviation, deviation, recordings, True, family=family),)
+
+
 @dataclass(frozen=True, slots=True)
 class ResidualBlock:
     """Rows of residuals that belong to one channel of one recording, or to a part of it, in order of time.
@@ -167,10 +174,9 @@ class ResidualBlock:
 class FitRuns:
     """Model runs of a fit at scaled points; the residuals of the last single point are cached.
 
-    ``start`` is also the mean of the priors, ``prior`` the reciprocal of their standard deviations, 0 for an unknown;
-    both are scaled. ``steps`` are the lengths of finite differences [-], which ``adapt_steps`` changes.
-    ``base @ point`` has the scaled values over which variables with a base are counted, 0 for the others. ``channels``
-    are the blocks by channel.
+    ``start`` is also the mean of the priors, ``prior`` the reciprocal of their standard deviations, 0 for an unknown.
+    ``steps`` are the lengths of finite differences [-]. ``base @ point`` has the values over which variables with a
+    base are counted, 0 for the others. ``channels`` are the blocks by channel.
     """
 
     def __init__(
@@ -211,8 +217,8 @@ class FitRuns:
     def jacobian(self, point: Floats, *, is_central: bool = True) -> Floats:
         """Return the Jacobian of the residuals [SI] by the scaled variables, from finite differences in one batch.
 
-        One-sided differences need half the runs and are accurate enough for the search; where one of their runs fails,
-        central differences are returned. Raises IdentificationError if no run succeeds on either side of a variable.
+        One-sided differences are accurate enough for the search; where one of their runs fails, central differences are
+        returned. Raises IdentificationError if no run succeeds on either side of a variable.
         """
         above, below = np.minimum(point + self.steps, self.high), np.maximum(point - self.steps, self.low)
         if not is_central:
@@ -264,10 +270,9 @@ class FitRuns:
 class Linear(NamedTuple):
     """Linearised least-squares problem of some runs.
 
-    ``rows``: whitened residuals and Jacobian [-], side by side. ``shared``: columns [-] for correlated errors, common
-    to the samples of a recording or covering the samples left out; after subtraction of ``shared @ (shared.T @ x)`` the
-    errors are independent. ``root``: square root of the covariance of the scaled variables. ``noise``: noise of each
-    row [SI]. ``sensors``: noise model by channel.
+    ``rows``: whitened residuals and Jacobian [-], side by side. ``shared``: columns [-] for correlated errors and for
+    the samples left out; after subtraction of ``shared @ (shared.T @ x)`` the errors are independent. ``root``: square
+    root of the covariance of the scaled variables. ``noise``: noise of each row [SI], ``sensors`` by channel.
     """
 
     runs: FitRuns
@@ -285,7 +290,7 @@ class Linear(NamedTuple):
         return np.asarray(errors - self.shared @ (self.shared.T @ errors))
 
     def squares(self, errors: Floats, points: Floats) -> Floats:
-        """Return the sum of squares [-] of independent errors (rows, points) and priors, for each scaled point."""
+        """Return the sum of squares of independent errors [-] (rows, points) and priors, for each scaled point."""
         away = (points - self.runs.start[:, None]) * self.runs.prior[:, None]
         return np.asarray(np.square(errors).sum(axis=0) + np.square(away).sum(axis=0))
 
@@ -300,8 +305,8 @@ def _linear_at(
     """Return the whitened problem at a point, and the step to its least-squares solution within the bounds.
 
     Fitting absorbs part of the noise, which is then missing in the residuals. The expected part J C J' is added and the
-    noise re-estimated until both agree (expectation maximisation), so that slow noise is not underestimated. Rows
-    ``left_out`` say nothing. Kind and order of the noise are those of ``like`` by channel, if it has any.
+    noise re-estimated until both agree (expectation maximisation). Rows ``left_out`` say nothing. Kind and order of the
+    noise are those of ``like`` by channel, if it has any.
     """
     step, hidden = np.zeros(len(point)), np.zeros((len(residuals), 0))
     limits = runs.low - point - 1.0e-300, runs.high - point + 1.0e-300
@@ -348,10 +353,7 @@ def _linear_at(
 
 
 def _root_of_inverse(curvature: Floats) -> tuple[Floats, Flags]:
-    """Return a square root of the inverse of a matrix, and flags of its columns that belong to observable directions.
-
-    The columns of unobservable directions are large.
-    """
+    """Return a square root of the inverse of a matrix, and flags of its columns of observable directions."""
     sizes = np.sqrt(np.maximum(np.diag(curvature), 0.0))
     size = np.where(sizes > 1.0e-9 * sizes.max(initial=0.0), sizes, sizes.max(initial=1.0e-9) or 1.0)
     values, vectors = np.linalg.eigh(curvature / size / size[:, None])
@@ -364,8 +366,8 @@ def _best_along(
     """Return the least sum of squares [-] along a step from a scaled point, its point, and the residuals [SI] there.
 
     The way bends as the residuals do along the step (geodesic acceleration), because static friction trades off against
-    its fall along a curved valley. A variable without a step stays. ``slopes`` is the whitened Jacobian [-] at the
-    point. The sum is infinite if no run succeeds, even after a ``_SHORT`` fraction of the step.
+    its fall along a curved valley. ``slopes`` is the whitened Jacobian at the point. The sum is infinite if no run
+    succeeds, even after a ``_SHORT`` fraction of the step.
     """
     runs = linear.runs
     ends = np.clip(np.column_stack([point + _SHORT * step, point - _SHORT * step]).T, runs.low, runs.high).T
@@ -387,9 +389,9 @@ def _best_along(
 def _interval_ends(linear: Linear, point: Floats, times: float) -> tuple[Floats, Floats]:
     """Return scaled lower and upper confidence limits: ``times`` standard errors, or wider for nonlinear laws.
 
-    Only intervals of unknowns without a prior are widened, by profile likelihood. The profile is the root of the
-    increase of the squares: by how many standard errors priors and samples tell a point from the estimate. It is
-    searched from the linear limit to the bound, which is the limit where the samples determine none.
+    Only intervals of unknowns without a prior are widened. The profile is the root of the increase of the squares: by
+    how many standard errors priors and samples tell a point from the estimate. It is searched from the linear limit to
+    the bound, which is the limit where the samples determine none.
     """
     runs, covariance = linear.runs, linear.root @ linear.root.T
     wide = times * np.sqrt(np.diag(covariance))
@@ -440,8 +442,8 @@ def _interval_ends(linear: Linear, point: Floats, times: float) -> tuple[Floats,
 def _least_along(linear: Linear, point: Floats, number: int) -> tuple[float, Floats]:
     """Return the least sum of squares [-] with one variable of a scaled point fixed, and the point that reaches it.
 
-    The other variables take Gauss-Newton steps within their bounds, each with its own Jacobian, because far from the
-    estimate its Jacobian leads out of a curved valley. The sum is infinite if no run succeeds.
+    Each Gauss-Newton step has its own Jacobian, because that of the estimate leads out of a curved valley.
+    The sum is infinite if no run succeeds.
     """
     runs = linear.runs
     residuals = runs.residuals_at_points(point[:, None])[:, 0]
@@ -474,10 +476,9 @@ def _least_along(linear: Linear, point: Floats, number: int) -> tuple[float, Flo
 class Conflict:
     """Part of the data that contradicts the rest or the model significantly, in ``words``.
 
-    ``group`` is a sensor ("pressure_1"), a recording ("back"), a channel of a recording ("pressure_1 of back"), another
-    group ("rising branch"), or the stated limit of a tolerance. ``number`` is the quantity that differs most, by
-    ``standard_errors`` standard errors, ``SHAPE``, or empty for residuals too smooth to be noise. ``p`` is the
-    probability of such a difference in any group if the model is right.
+    ``group`` is a sensor, a recording, a channel of a recording ("pressure_1 of back"), another group (a branch), or
+    the stated limit of a tolerance. ``number`` is the quantity that differs most, by ``standard_errors``, ``SHAPE``,
+    or empty for residuals too smooth to be noise. ``p`` is the probability of such a difference if the model is right.
     """
 
     group: str
@@ -490,8 +491,8 @@ class Conflict:
 def wrong_shape(sensor: str, series: Sequence[Floats]) -> Conflict | None:
     """Return a conflict if neighbouring residuals of a sensor follow each other, as noise does not; else None.
 
-    ``series`` are residuals divided by their noise [-], each in order of what the law predicts. Their correlation with
-    the next one times the root of the count is standard normal under white noise.
+    ``series`` are residuals divided by their noise, each in order of what the law predicts. Their correlation with the
+    next one times the root of the count is standard normal under white noise.
     """
     size = sum(float(values @ values) for values in series)
     count = sum(values.size - 1 for values in series)
@@ -512,9 +513,9 @@ def other_shape(sensor: str, errors: float, p: float = 0.0) -> Conflict:
 def _conflict_of(runs: FitRuns, rows: Floats, point: Floats, free: Flags, freedom: float) -> Conflict | None:
     """Return the group of rows whose separate estimates differ most from the common estimates; None if insignificant.
 
-    Groups are every sensor, recording, channel of a recording and named group; Hausman's test: the estimate of a group
-    alone differs by d = -H_g^-1 (J_g' r_g + P (z - m)), with covariance H_g^-1 - C. With C = L L' and the eigenvalues a
-    of L' H_g L, both are diagonal: d'(H_g^-1 - C)^-1 d is the sum of q^2 / (a (1 - a)).
+    Hausman's test: the estimate of a group alone differs by d = -H_g^-1 (J_g' r_g + P (z - m)), with covariance
+    H_g^-1 - C. With C = L L' and the eigenvalues a of L' H_g L, both are diagonal: d'(H_g^-1 - C)^-1 d is the sum of
+    q^2 / (a (1 - a)).
     """
     errors, slopes = rows[:, 0], rows[:, 1:][:, free]
     prior, shift = np.square(runs.prior[free]), (point - runs.start)[free]
@@ -589,14 +590,12 @@ def _beyond_limit(name: str, errors: float, p: float) -> Conflict:
 class Fit:
     """Result of a fit in SI units, in the order of ``numbers``; a variable with a base includes its base here.
 
-    ``numbers``: variables of the fit. ``values``: estimates. ``covariance``: their covariance. ``low``, ``high``: ends
-    of the confidence intervals at ``confidence``. ``outliers``: rows of residuals left out as isolated outliers.
-    ``conflict``: part of the data that contradicts the rest, if any. ``unidentified``: combinations that the recordings
-    do not determine, as weights of variables relative to their values. ``shares``: for each variable, the tolerances
-    that contribute to its variance, with fractions [-], largest first. ``evaluations``: number of model runs.
-    ``log_likelihood``: log-likelihood [-] of whitened residuals and priors, up to a constant of the readings.
-    ``sensors``: noise model by channel. ``edge``: unknowns that the search drives to values at which no run succeeds,
-    with the direction, 1 upwards or -1 downwards; such a search has not converged.
+    ``low``, ``high``: ends of the confidence intervals. ``outliers``: rows of residuals left out as isolated outliers.
+    ``unidentified``: combinations that the recordings do not determine, as weights of variables relative to their
+    values. ``shares``: for each variable, the tolerances that contribute to its variance, with fractions [-], largest
+    first. ``evaluations``: number of model runs. ``log_likelihood``: that of whitened residuals and priors [-], up to a
+    constant of the readings. ``sensors``: noise model by channel. ``edge``: unknowns that the search drives to where no
+    run succeeds, with the direction, 1 upwards or -1 downwards; such a search has not converged.
     """
 
     numbers: tuple[FitNumber, ...]
@@ -633,20 +632,12 @@ def fit(
 ) -> Fit:
     """Fit variables to recordings; the result has covariance, intervals and consistency tests.
 
-    Weighted squares are minimised within bounds, at first with a robust loss (soft L1); the weights follow from the
-    residuals of each channel. Then residuals are whitened by the noise model of each channel, and Gauss-Newton steps
-    follow until none reduces the cost. Another start is used only if it explains the recordings better. ``memory`` is
-    the highest order of the noise autoregression, 0 for independent readings. In recordings of motion (``is_motion``)
+    Weighted squares are minimised within bounds, at first with a robust loss (soft L1); then residuals are whitened by
+    the noise model of each channel. Another start is used only if it explains the recordings better. ``memory`` is the
+    highest order of the noise autoregression, 0 for independent readings. In recordings of motion (``is_motion``)
     sensors may drift, and samples affected by an impact are left out; for bench readings, drift cannot be separated
-    from slow signals. Raises IdentificationError if no run succeeds, if there are no more samples than unknowns, or if
-    the bounds of a variable do not enclose its start.
+    from slow signals. Raises IdentificationError if no run succeeds, or if there are no more samples than unknowns.
     """
-    for number in numbers:
-        if not (number.low <= number.start <= number.high and number.low < number.high):
-            raise IdentificationError(
-                f"{number.name}: bounds {number.low:g} to {number.high:g}, start {number.start:g}: the lower bound "
-                "must be below the upper bound and the start between them"
-            )
     runs = FitRuns(residuals, tuple(numbers), tuple(blocks), report, memory, is_motion)
     samples = sum(block.rows.stop - block.rows.start for block in blocks)
     sought = sum(math.isinf(number.deviation) for number in numbers)
@@ -686,8 +677,7 @@ def fit(
 
 def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
     """Return the fit, with intervals and consistency tests, found by a search from a scaled start point."""
-    searched, outliers = _search(runs, start)
-    point, linear, step, gain = _settle(runs, searched, outliers)
+    point, linear, step, gain, outliers = _least_squares(runs, start)
     errors, jacobian = linear.rows[:, 0], linear.rows[:, 1:]
     covariance = linear.root @ linear.root.T
     # Effective degrees of freedom: samples less the trace of J C J', to which a prior contributes little.
@@ -763,13 +753,17 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
     )
 
 
-def _search(runs: FitRuns, start: Floats) -> tuple[Floats, Indices]:
-    """Search for the least squares of residuals and priors with white noise, first with a robust loss, roughly.
+def _least_squares(runs: FitRuns, start: Floats) -> tuple[Floats, Linear, Floats, float, Indices]:
+    """Return the minimum of residuals and priors from a scaled start point: a rough search, then Gauss-Newton steps.
 
-    A variable at a bound can lose its gradient while the clock is still wrong, therefore the robust loss. Returns the
-    scaled point, and for motion the rows of isolated outliers, at most one sample in 100: a single one near a
-    break-away could otherwise determine a friction. If more stand out, the noise has heavy tails: the largest are left
-    out.
+    It is a scaled point, its linearisation, the step that is left to its minimum, the decrease of the squares in the
+    last step [-], -inf if no run succeeds after a short step, and the rows that are isolated outliers.
+
+    The search has white noise and at first a robust loss, because a variable at a bound can lose its gradient while the
+    clock is still wrong. In a fit of motion outliers are left out: a single one near a break-away could otherwise
+    determine a friction. If too many stand out, the noise has heavy tails: the largest are left out. The steps have
+    white noise, then the noise of each channel. Its kind and order, and samples of high leverage, are chosen once, at
+    the minimum for white noise: chosen on the way, they would depend on the start.
     """
     point, outliers = np.clip(start, runs.low, runs.high), np.zeros(0, dtype=np.intp)
     weight = np.zeros(0)
@@ -804,18 +798,6 @@ def _search(runs: FitRuns, start: Floats) -> tuple[Floats, Indices]:
             order = np.argsort(-np.concatenate(sizes), kind="stable")[: int(_LEFT_OUT * len(residuals))]
             outliers = np.sort(np.concatenate(rows)[order])
         residuals[outliers] = 0.0
-    return point, outliers
-
-
-def _settle(runs: FitRuns, point: Floats, outliers: Indices) -> tuple[Floats, Linear, Floats, float]:
-    """Return the minimum by Gauss-Newton steps, for white noise and then for the noise of each channel.
-
-    It is a scaled point, its linearisation, the step that is left to its minimum, and the decrease of the squares in
-    the last step [-], -inf if no run succeeds after a short step.
-
-    Outliers are left out and, in a fit of motion, also samples of high leverage. These and the kind and order of the
-    noise are chosen once, at the minimum for white noise: chosen on the way, they would depend on the start.
-    """
     residuals, jacobian, left_out = runs.residuals_at(point), runs.jacobian(point), outliers
     kinds, stage, last = {channel: Noise(1.0) for channel in runs.channels}, 0, 2 if runs.is_motion else 1
     for _ in range(_GAUSS_NEWTON):
@@ -839,7 +821,7 @@ def _settle(runs: FitRuns, point: Floats, outliers: Indices) -> tuple[Floats, Li
             leverage = np.square(linear.rows[:, 1:] @ linear.root).sum(axis=1)
             highest = np.argsort(-leverage)[: int(_LEFT_OUT * len(leverage))]
             left_out = np.union1d(outliers, highest[leverage[highest] > _LEVERAGE])
-    return point, linear, step, gain
+    return point, linear, step, gain, outliers
 
 
 def estimate_of(fitted: Fit, row: int, recordings: Sequence[str], conflict: str) -> Estimate:
@@ -894,9 +876,3 @@ def estimate_of(fitted: Fit, row: int, recordings: Sequence[str], conflict: str)
     why = f"{text}; {why}." if text else why
     size, confidence = number.size, fitted.confidence
     return Estimate(number.name, value, number.unit, low, high, verdict, why, tuple(recordings), confidence, size)
-
-
-def conflict_in_words(fitted: Fit, reason: str = "") -> str:
-    """Return a sentence on the readings that contradict the others, with a reason if known; empty if all agree."""
-    words = "" if fitted.conflict is None else fitted.conflict.words
-    return f"{words}; {reason}" if words and reason else words

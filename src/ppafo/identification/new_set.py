@@ -4,27 +4,27 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from ppafo.errors import ParameterError, UnitError
+from ppafo.errors import ParameterError
 from ppafo.identification.estimate import Estimate, in_shown_unit, interval_factor
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION
 from ppafo.parameters.building import build_device
-from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, alternatives, is_within
+from ppafo.parameters.declaration import is_within
 from ppafo.parameters.graph import acting
+from ppafo.parameters.overrides import other_forms
 from ppafo.parameters.parameter_set import (
     CONFIDENCE,
     Entry,
     ParameterSet,
     atmospheric_pressure,
     entry_text,
+    in_first_unit,
     links_of_set,
 )
 from ppafo.units import from_si, to_si
 
-_AREA_NAMES, _SONIC_NAMES = ({item.name for item in form} for form in (AREA_FORM, SONIC_FORM))
 _TABLE = f"{SECTION}.opening."
-_FORMS = ((_AREA_NAMES, _SONIC_NAMES), (_SONIC_NAMES, _AREA_NAMES))
 _DIGITS = 3
 """Significant digits of the half-width to which a value is rounded."""
 
@@ -59,12 +59,8 @@ def with_estimates(parameter_set: ParameterSet, estimates: Iterable[Estimate], v
         used[estimate.path] = estimate
         # In the unit of the earlier entry.
         before = parameter_set.numbers.get(estimate.path)
-        atmosphere = atmospheric_pressure(parameter_set)
-        unit = quantity.unit if before is None else before.unit
-        si_unit = fitting_unit(unit, quantity)
-        value, low, high = (
-            from_si(number, unit, si_unit, atmosphere) for number in (estimate.value, estimate.low, estimate.high)
-        )
+        unit, ends = quantity.unit if before is None else before.unit, (estimate.value, estimate.low, estimate.high)
+        value, low, high = (_in_unit(unit, end, quantity, parameter_set) for end in ends)
         previous = "no value" if before is None else f"{entry_text(before)} ({before.origin}: {before.source})"
         said = f"{100.0 * estimate.confidence:g}% interval {low:.6g} to {high:.6g} {unit}".rstrip()
         said = f"{estimate.verdict_text}, {said}; {estimate.explanation.rstrip('.')}"
@@ -80,8 +76,7 @@ def with_estimates(parameter_set: ParameterSet, estimates: Iterable[Estimate], v
             uncertainty=_in_digits_of(half_width, half_width),
         )
         # An orifice that is given as an area has no sonic conductance any more, and the other way round.
-        section, _, name = estimate.path.rpartition(".")
-        others = {f"{section}.{member}" for form, other in _FORMS if name in form for member in other}
+        others = other_forms(estimate.path)
         numbers = {path: old for path, old in parameter_set.numbers.items() if path not in others}
         # A pressure that was fitted for both regulators holds for both.
         links = acting(links_of_set(parameter_set), {estimate.path})
@@ -113,22 +108,12 @@ def _in_digits_of(value: float, half_width: float) -> float:
     return round(value, _DIGITS - 1 - math.floor(math.log10(half_width)))
 
 
-def fitting_unit(unit: str, quantity: Quantity) -> str:
-    """Return the SI unit, among the alternatives declared for a quantity, to which a unit can be converted."""
-    for item in alternatives(quantity):
-        try:
-            from_si(1.0, unit, item)
-        except UnitError:
-            continue
-        return item
-    return quantity.unit
-
-
-def stated_half_width(entry: Entry, unit: str) -> float:
-    """Return the half-width of the 95 % interval stated in a set, converted to ``unit``; 0 if none is stated."""
+def stated_half_width(entry: Entry, quantity: Quantity) -> float:
+    """Return the half-width of the 95 % interval stated in a set [SI]; 0 if none is stated."""
     if not entry.uncertainty:
         return 0.0
-    return to_si(entry.value + entry.uncertainty, entry.unit, unit) - to_si(entry.value, entry.unit, unit)
+    ends = entry.value + entry.uncertainty, entry.value
+    return in_first_unit(quantity, lambda si: to_si(ends[0], entry.unit, si) - to_si(ends[1], entry.unit, si))
 
 
 def in_set_unit(number: float, path: str, si_unit: str, parameter_set: ParameterSet) -> tuple[float, str]:
@@ -136,5 +121,9 @@ def in_set_unit(number: float, path: str, si_unit: str, parameter_set: Parameter
     entry, quantity = parameter_set.numbers.get(path), parameter_set.declarations().get(path)
     if entry is None or quantity is None or entry.unit == si_unit:
         return in_shown_unit(number, si_unit)
-    si = fitting_unit(entry.unit, quantity)
-    return from_si(number, entry.unit, si, atmospheric_pressure(parameter_set)), entry.unit
+    return _in_unit(entry.unit, number, quantity, parameter_set), entry.unit
+
+
+def _in_unit(unit: str, number: float, quantity: Quantity, parameter_set: ParameterSet) -> float:
+    """Return a number [SI] in the unit of an entry of the set."""
+    return in_first_unit(quantity, lambda si: from_si(number, unit, si, atmospheric_pressure(parameter_set)))

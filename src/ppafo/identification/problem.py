@@ -17,20 +17,15 @@ from ppafo.model.declaration import Number
 from ppafo.parameters.declared import SHORT_NAME, Words
 from ppafo.parameters.parameter_set import Citation
 from ppafo.parameters.records import SchemaVersion, checked_record, keyed, record_schema
-from ppafo.simulation.recorded.channels import (
-    ANGLE,
-    COMMAND,
-    DORSIFLEXION_SUPPLY,
-    EXTERNAL_TORQUE,
-    LONGEST_STEP,
-    SUPPLY,
-)
+from ppafo.simulation.recorded.channels import LONGEST_STEP
 from ppafo.storage.column_map import ColumnMap
 from ppafo.wording import known_names, nearest_name
 
 _Label = Annotated[str, Words("name of the experiment, also used in file names", pattern=SHORT_NAME)]
-ALL_INPUTS = (COMMAND, SUPPLY, EXTERNAL_TORQUE, DORSIFLEXION_SUPPLY, ANGLE)
-"""Recorded channels that may replace inputs of the scenario; a recorded angle is a prescribed motion."""
+Input = Literal["command", "supply_pressure", "external_torque", "dorsiflexion_pressure", "angle"]
+"""Recorded channel that may replace an input of the scenario; a recorded angle is a prescribed motion."""
+Compared = Literal["angle", "pressure_1", "pressure_2"]
+"""Channel that a fit can compare with a recording [rad], [Pa], [Pa]."""
 SHORTEST_STEP = 1.0e-6
 """Shortest time step that a problem file may request [s]."""
 _FILE = TomlKind(
@@ -38,16 +33,16 @@ _FILE = TomlKind(
 )
 
 
-_PASCALS = Number("Pa_d", "", minimum=0.0, minimum_allowed=False)
+_above_zero = partial(Number, minimum=0.0, minimum_allowed=False)
 
 
 @dataclass(frozen=True, slots=True)
 class NoiseSection:
     """Standard deviations of the noise by channel."""
 
-    angle: float | None = keyed(Number("rad", "", minimum=0.0, minimum_allowed=False), None)
-    pressure_1: float | None = keyed(_PASCALS, None)
-    pressure_2: float | None = keyed(_PASCALS, None)
+    angle: float | None = keyed(_above_zero("rad", ""), None)
+    pressure_1: float | None = keyed(_above_zero("Pa_d", ""), None)
+    pressure_2: float | None = keyed(_above_zero("Pa_d", ""), None)
 
     def by_channel(self) -> dict[str, float]:
         """Return the standard deviations that are stated, by channel [SI]."""
@@ -59,9 +54,7 @@ class PriorSection:
     """Prior of a parameter: a normal distribution."""
 
     mean: str = keyed("most likely value, with its unit")
-    relative: float = keyed(
-        Number("", "standard deviation over the mean", minimum=0.0, minimum_allowed=False, plain=True)
-    )
+    relative: float = keyed(_above_zero("", "standard deviation over the mean", plain=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +62,9 @@ class ParameterSection:
     """Table [[trajectory.parameters]]: parameter to fit, with start, bounds and prior."""
 
     path: str = keyed("dotted path, such as friction.viscous_damping or initial.pressure_1")
-    start: str | None = keyed("start of the search; default: from the bench procedures, else the set", None)
+    start: str | None = keyed(
+        "start of the search; default: the mean of the prior, else from the bench procedures, else the set", None
+    )
     low: str | None = keyed("lower bound", None)
     high: str | None = keyed("upper bound", None)
     prior: PriorSection | Literal["bench"] | None = keyed(
@@ -90,37 +85,31 @@ class ExperimentSection:
     recording: str = keyed("file, relative to this one")
     columns: Columns = None
     scenario: str | None = keyed("name or relative file of a scenario; default: the recorded inputs", None)
-    overrides: tuple[str, ...] = keyed("changes to the scenario, or to the device without one", ())
+    overrides: tuple[str, ...] = keyed("changes to the scenario, or to the device without one; of no fitted number", ())
     start: float | None = keyed(
         Number("s", "time of the recording at which the run begins; 0 s, or the first sample"), None
     )
     step: float | None = keyed(
         Number("s", "longest step of time in the run, such as '0.1 ms'", None, SHORTEST_STEP, LONGEST_STEP), None
     )
-    channels: tuple[str, ...] | None = keyed(
+    channels: tuple[Compared, ...] | None = keyed(
         "compared channels; default: angle and pressures, unless locked or prescribed", None
     )
     noise: NoiseSection = keyed(
         "least standard deviation by channel, '0.1 deg', '500 Pa_d'; default: none", NoiseSection()
     )
-    inputs: tuple[str, ...] | None = keyed(
-        f"recorded channels used as inputs of the run: {', '.join(ALL_INPUTS)}", None
-    )
+    inputs: tuple[Input, ...] | None = keyed("recorded channels used as inputs of the run", None)
     locked: float | None = keyed(
         Number("rad", "angle at which the vane is locked, such as '75 deg'; without a scenario"), None
     )
     volume: float | None = keyed(
-        Number(
-            "m^3", "fixed volume in place of the vane, '60 cm^3'; without a scenario", None, 0.0, minimum_allowed=False
-        ),
-        None,
+        _above_zero("m^3", "fixed volume in place of the vane, '60 cm^3'; without a scenario"), None
     )
     initial_state: Literal["scenario", "recording", "fitted"] | None = keyed(
         "state at the start; 'recording' and 'fitted' are one; default: the scenario, else the recording", None
     )
     time_offset: float | None = keyed(
-        Number("s", "limit of a fitted delay of the samples behind the run, '20 ms'", None, 0.0, minimum_allowed=False),
-        None,
+        _above_zero("s", "limit of a fitted delay of the samples behind the run, '20 ms'"), None
     )
 
 
@@ -151,7 +140,7 @@ class DeviceProblem:
 
     set: str = keyed("name of a parameter set, or a path relative to this file")
     valve: str | None = keyed("name of a valve of the set; default: the chosen one", None)
-    overrides: tuple[str, ...] = keyed("overrides of the set, kept in the new set", ())
+    overrides: tuple[str, ...] = keyed("overrides of the set, kept in the new set but where a value is identified", ())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

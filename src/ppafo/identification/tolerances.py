@@ -6,6 +6,7 @@ which is 1.96 standard deviations.
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Literal
 
 from ppafo.identification.estimate import interval_factor
@@ -58,12 +59,8 @@ Confidence = Annotated[
 ]
 
 
-def _limit(unit: str, summary: str, largest: float = math.inf) -> Quantity:
-    return Quantity("", unit, summary, minimum=0.0, maximum=largest)
-
-
-def _share(summary: str) -> Quantity:
-    return _limit("1", summary, _LARGEST_FRACTION)
+_limit = partial(Quantity, "", minimum=0.0)
+_share = partial(Quantity, "", "1", minimum=0.0, maximum=_LARGEST_FRACTION)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -209,21 +209,6 @@ def test_as_many_samples_as_numbers_are_refused() -> None:
         )
 
 
-@pytest.mark.parametrize(
-    ("numbers", "blocks", "said"),
-    [
-        ((FitNumber("rate", 2.0, 2.0, 2.0, 2.0),), _BLOCKS, "rate: bounds 2 to 2, start 2"),
-        ((FitNumber("rate", 9.0, 0.1, 5.0, 2.0),), _BLOCKS, "rate: bounds 0.1 to 5, start 9"),
-    ],
-    ids=["equal bounds", "start outside"],
-)
-def test_a_fit_that_cannot_begin_says_why(
-    numbers: tuple[FitNumber, ...], blocks: tuple[ResidualBlock, ...], said: str
-) -> None:
-    with pytest.raises(IdentificationError, match=said):
-        fit(lambda points: np.zeros((_COUNT, points.shape[1])), numbers, blocks)
-
-
 @pytest.mark.parametrize("deviation", [0.8, 1.5])
 def test_an_interval_along_a_product_ends_where_the_prior_of_the_other_number_ends(deviation: float) -> None:
     """Of the two the samples tell the product alone: where one ends, the exponent is at an end of its prior.

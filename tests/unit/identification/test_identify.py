@@ -203,7 +203,7 @@ def test_friction_that_grows_is_written_with_its_growth(solved: Solve) -> None:
 def test_the_same_recording_twice_is_refused_by_the_hash_of_its_numbers(solved: Solve, bench: Path, name: str) -> None:
     (bench / "copy.csv").write_text("# a copy\n" + (bench / "decay.csv").read_text())
     for text in (DECAY.replace('"decay.csv"', f'"decay.csv", "{name}"'), DECAY + DECAY.replace("decay.csv", name)):
-        with pytest.raises(PpafoError, match=r"problem\.toml: .* are the same recording \(SHA-256 \w{12}\)"):
+        with pytest.raises(PpafoError, match=r"problem\.toml: .* are the same recording"):
             solved(text)
 
 
@@ -416,7 +416,7 @@ def test_what_a_problem_states_of_the_bench_takes_the_place_of_the_default(
     solved: Solve, text: str, stated: str
 ) -> None:
     usual, wide = (solved(f"{more}{text}").estimates for more in ("", f"[bench]\n{stated}\n"))
-    assert any(b.half_width > 1.5 * a.half_width for a, b in zip(usual, wide, strict=True))
+    assert any(b.wider_half_width > 1.5 * a.wider_half_width for a, b in zip(usual, wide, strict=True))
 
 
 def test_the_gas_temperature_is_known_as_well_as_it_is_stated(solved: Solve, bench: Path) -> None:
@@ -424,7 +424,7 @@ def test_the_gas_temperature_is_known_as_well_as_it_is_stated(solved: Solve, ben
     usual = solved(FLOW).results[0][path]
     measured = solved(f'{FLOW}temperature = "24.85 degC"\n').results[0][path]
     assert "gas temperature" in usual.explanation
-    assert measured.half_width < 0.85 * usual.half_width
+    assert measured.wider_half_width < 0.85 * usual.wider_half_width
     text = parameter_set_toml(load_parameter_set("ppafo2011"))
     known = '[gas.temperature]\nvalue = 298.0\nunit = "K"\n'
     assert text.count(known) == 1
@@ -432,11 +432,11 @@ def test_the_gas_temperature_is_known_as_well_as_it_is_stated(solved: Solve, ben
     head, half = HEAD.replace("ppafo2011", "warm.toml"), {}
     for stated in ("", "gas_temperature = '1 K'", "gas_temperature = '35.348 K'", "held = '1 %'"):
         (bench / "problem.toml").write_text(f"{head}[bench]\n{stated}\n{FLOW}")
-        half[stated] = identify(bench / "problem.toml").found.results[0][path].half_width
-    assert half[""] > 1.4 * usual.half_width
+        half[stated] = identify(bench / "problem.toml").found.results[0][path].wider_half_width
+    assert half[""] > 1.4 * usual.wider_half_width
     # The set states half a 95 % interval: 40 K / 1.96 is the standard deviation of a limit of 35.348 K.
     assert half[""] == half["held = '1 %'"] == pytest.approx(half["gas_temperature = '35.348 K'"], rel=1e-4)
-    assert half["gas_temperature = '1 K'"] == pytest.approx(measured.half_width, rel=1e-6)
+    assert half["gas_temperature = '1 K'"] == pytest.approx(measured.wider_half_width, rel=1e-6)
 
 
 def test_bench_and_trajectory_hold_a_number_alike() -> None:

@@ -110,7 +110,7 @@ def test_planted_values_are_found_from_a_scenario_and_from_a_recording_without_o
         if estimate.path in truth:
             assert estimate.verdict == "identified"
             # Three standard errors: 3/1.96 half widths.
-            assert abs(estimate.value - truth[estimate.path]) < 3.0 / 1.96 * estimate.half_width
+            assert abs(estimate.value - truth[estimate.path]) < 3.0 / 1.96 * estimate.wider_half_width
     assert both.is_good
     assert both.trajectory.remarks == ()
 
@@ -225,7 +225,7 @@ def test_a_value_that_both_found_is_that_of_the_fit_in_the_new_set(solve: Solve)
 def test_a_value_that_the_fit_cannot_tell_leaves_what_the_bench_found(solve: Solve) -> None:
     outcome = solve(f"{STATIC}{FIT}[[trajectory.parameters]]\npath = 'friction.static_torque'\n")
     assert outcome.trajectory is not None
-    assert outcome.trajectory.estimate("friction.static_torque").verdict == "not identifiable"
+    assert outcome.trajectory["friction.static_torque"].verdict == "not identifiable"
     assert outcome.new_set.parameter_set.numbers["friction.static_torque"].source.startswith("static.csv")
 
 
@@ -236,7 +236,7 @@ def test_the_interval_of_the_bench_can_be_the_prior_of_the_fit(solve: Solve) -> 
     known = outcome.results[0]["friction.static_torque"]
     given = next(one for one in outcome.trajectory.fit.numbers if one.path == "friction.static_torque")
     assert given.start == known.value
-    assert given.deviation == pytest.approx(known.half_width / 1.96, rel=1e-2)
+    assert given.deviation == pytest.approx(known.wider_half_width / 1.96, rel=1e-2)
     with pytest.raises(PpafoError, match="prior = 'bench' needs a value that a procedure of this problem identifies"):
         solve(FIT + prior)
 
@@ -285,7 +285,7 @@ pressure_2 = { column = 4, unit = "Pa_a" }
     outcome = solve(changed + mapped)
     assert outcome.trajectory is not None
     assert outcome.trajectory.scenarios[0].device.name == "ppafo2011"
-    inertia = outcome.trajectory.estimate("foot_plate.inertia")
+    inertia = outcome.trajectory["foot_plate.inertia"]
     assert inertia.low <= 0.010 <= inertia.high
 
 
@@ -312,10 +312,18 @@ pressure_2 = { column = 4, unit = "Pa_a" }
         ),
         (
             f"{FIT}inputs = ['comand']\n",
-            "channel 'comand' is not a measured input, did you mean 'command'",
+            "inputs.1 = 'comand' is not allowed, did you mean 'command'",
         ),
         (f"{FIT}inputs = ['external_torque']\n", "has no channel 'external_torque'"),
-        (f"{FIT}channels = ['torque']\n", "channel 'torque' cannot be fitted"),
+        (f"{FIT}channels = ['torque']\n", "trajectory.experiments.1.channels.1 = 'torque'"),
+        (
+            f"{FIT}overrides = ['valve.discharge_coefficient=0.2']\n",
+            "'step': overrides: valve.discharge_coefficient is ",
+        ),
+        (
+            f"{FIT}prior = {{ mean = '0.3', relative = 0.1 }}\nhigh = '0.2'\n".replace(STEP, "") + STEP,
+            "the mean of its",
+        ),
         (
             f"{FIT}noise = {{ angel = '1 deg' }}\n",
             "unknown key 'trajectory.experiments.1.noise.angel', did you mean 'angle'",

@@ -33,7 +33,6 @@ from ppafo.identification.bench.law import (
     result_of,
     solve,
     sought,
-    tolerance,
     within,
 )
 from ppafo.identification.bench.readings import (
@@ -44,7 +43,7 @@ from ppafo.identification.bench.readings import (
     check_sources,
     meter_readings,
 )
-from ppafo.identification.fit import Fit, FitNumber, Flags
+from ppafo.identification.fit import Fit, FitNumber, Flags, tolerance
 from ppafo.identification.source import RecordingSource, Sources, pool
 from ppafo.identification.tolerances import GAS_LAW as LIMIT_OF_GAS_LAW
 from ppafo.identification.tolerances import Tolerances
@@ -152,7 +151,7 @@ class FlowLaw(BenchLaw):
         """
         if (temperature := self.temperature) is None:
             (temperature,) = context.numbers("gas.temperature")
-            deviation = context.deviation("gas.temperature", temperature, "K")
+            deviation = context.deviation("gas.temperature", temperature)
         else:
             limit = context.tolerances.gas_temperature
             deviation = deviation_of_limit(_THERMOMETER if limit is None else limit)

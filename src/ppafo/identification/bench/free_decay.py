@@ -28,7 +28,6 @@ from ppafo.identification.bench.law import (
     result_of,
     solve,
     sought,
-    tolerance,
     within,
 )
 from ppafo.identification.bench.readings import (
@@ -38,7 +37,7 @@ from ppafo.identification.bench.readings import (
     check_sources,
     without_wrong_samples,
 )
-from ppafo.identification.fit import FitNumber
+from ppafo.identification.fit import FitNumber, tolerance
 from ppafo.identification.source import RecordingSource, Sources, window
 from ppafo.model.declaration import Number
 from ppafo.parameters.records import keyed
@@ -239,7 +238,7 @@ class FreeDecayProblem(TimedLaw):
         if self.inertia is not None:
             return self.inertia, context.tolerances.deviation_of(path, self.inertia, 0.0)
         inertia = context.number(path)
-        return inertia, 0.0 if inertia is None else context.deviation(path, inertia, "kg m^2")
+        return inertia, 0.0 if inertia is None else context.deviation(path, inertia)
 
     def run(self, sources: Sources, context: BenchContext) -> BenchResult:
         """Identify viscous damping [N m s/rad] and dynamic friction [N m], or both over inertia [1/s, rad/s^2].

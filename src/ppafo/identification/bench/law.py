@@ -11,7 +11,15 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.estimate import Identified
-from ppafo.identification.fit import Fit, FitNumber, ResidualBlock, conflict_in_words, estimate_of, fit, wrong_shape
+from ppafo.identification.fit import (
+    Fit,
+    FitNumber,
+    ResidualBlock,
+    estimate_of,
+    fit,
+    tolerance,
+    wrong_shape,
+)
 from ppafo.identification.new_set import stated_half_width
 from ppafo.identification.noise import SAMPLES_PER_COEFFICIENT
 from ppafo.identification.source import Sources, kind_of, remarks_on_readings
@@ -37,8 +45,6 @@ _MEMORY = 2
 """Highest order of the noise autoregression: enough for sensor lag, drift or hum, too low to absorb model error."""
 _TELLING = 1.0e-3
 """Least residuals whose shape is tested [ranges of the readings]; smaller ones are lost in the errors of a bench."""
-_WIDEST = 12.0
-"""Largest deviation of a tolerance in the search, as a multiple of its limit [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,10 +87,11 @@ class BenchContext:
             raise IdentificationError(f"{self.label}: {said_missing(missing)} in {self.parameter_set.file}")
         return [value for value in found.values() if value is not None]
 
-    def deviation(self, path: str, value: float, unit: str) -> float:
-        """Return the standard deviation [unit] of a parameter of given ``value``: from bench, set, or defaults."""
+    def deviation(self, path: str, value: float) -> float:
+        """Return the standard deviation [SI] of a parameter of given ``value``: from bench, set, or defaults."""
         entry = with_followers(self.parameter_set).numbers.get(path)
-        return self.tolerances.deviation_of(path, value, 0.0 if entry is None else stated_half_width(entry, unit))
+        half_width = 0.0 if entry is None else stated_half_width(entry, self.parameter_set.declarations()[path])
+        return self.tolerances.deviation_of(path, value, half_width)
 
     def valve_path(self, name: str | None) -> str:
         """Return the path of a valve in the set, such as ``valves.main``; None means the chosen valve."""
@@ -136,7 +143,8 @@ def result_of(
 
     ``reason`` says more of a conflict, if readings contradict the others; ``scatter`` is the field of the result.
     """
-    origin, conflict = [source.trace for source in sources], conflict_in_words(fitted, reason)
+    origin, conflict = [source.trace for source in sources], "" if fitted.conflict is None else fitted.conflict.words
+    conflict = f"{conflict}; {reason}" if conflict and reason else conflict
     rows = [row for row, number in enumerate(fitted.numbers) if number.text]
     return BenchResult(
         procedure=sources[0].user,
@@ -168,19 +176,6 @@ def figure_3(torque: BenchResult, decay: BenchResult) -> "Figure":
         words = "" if result.kind == "measured" else f", {result.kind}"
         panels.append(replace(panel, title=f"{panel.title}{words}", legend="above"))
     return bench_figure(panels, kind_of((torque.kind, decay.kind)))
-
-
-def tolerance(name: str, deviation: float, start: float = 0.0, family: str = "") -> tuple[FitNumber, ...]:
-    """Return a variable with a prior of standard deviation ``deviation`` about ``start`` [SI]; nothing if exact.
-
-    Variables of one ``family`` are tested together.
-    """
-    if not deviation > 0.0:
-        return ()
-    # The scale of the search is the limit, so that a step of one scale is a likely one.
-    limit = math.sqrt(3.0) * deviation
-    width = _WIDEST * limit
-    return (FitNumber(name, start, start - width, start + width, limit, deviation, (), True, family=family),)
 
 
 def within(limit: float, *names: str, family: str = "") -> tuple[FitNumber, ...]:

@@ -47,7 +47,6 @@ from ppafo.identification.bench.law import (
     result_of,
     solve,
     sought,
-    tolerance,
     within,
 )
 from ppafo.identification.bench.readings import (
@@ -59,7 +58,7 @@ from ppafo.identification.bench.readings import (
     without_wrong_samples,
 )
 from ppafo.identification.estimate import in_shown_unit, interval_texts
-from ppafo.identification.fit import Fit, FitNumber
+from ppafo.identification.fit import Fit, FitNumber, tolerance
 from ppafo.identification.source import RecordingSource, Sources, window
 from ppafo.model.declaration import Number
 from ppafo.parameters.device import VANE
@@ -412,8 +411,8 @@ class VaneLeakProblem(LeakLaw, TimedLaw):
             # A volume that is given counts before one from the angle: its line may be another one.
             first = first or dead_1 + per_angle * (angle - lower)
             second = second or dead_2 + per_angle * (upper - angle)
-            of_volume = context.deviation("actuator.dead_volume_1", dead_1, "m^3")
-            of_angle = (angle - lower) * context.deviation("actuator.displacement_per_radian", per_angle, "m^3/rad")
+            of_volume = context.deviation("actuator.dead_volume_1", dead_1)
+            of_angle = (angle - lower) * context.deviation("actuator.displacement_per_radian", per_angle)
             deviation = math.hypot(of_volume, of_angle) / (dead_1 + per_angle * (angle - lower))
         return first, second, deviation
 

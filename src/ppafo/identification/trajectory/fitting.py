@@ -23,7 +23,7 @@ from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import DataError, IdentificationError, refused_as
 from ppafo.identification.bench.law import BenchContext
 from ppafo.identification.estimate import Estimate, Identified, in_shown_unit, shown_text
-from ppafo.identification.fit import Fit, FitNumber, FitRuns, ResidualBlock, conflict_in_words, estimate_of
+from ppafo.identification.fit import Fit, FitNumber, FitRuns, ResidualBlock, estimate_of
 from ppafo.identification.fit import fit as fit_residuals
 from ppafo.identification.noise import Noise, whiten
 from ppafo.identification.problem import TrajectorySection
@@ -37,17 +37,18 @@ from ppafo.identification.trajectory.experiment import (
     FittedExperiment,
     TrajectoryProblem,
     broken_rule,
+    experiment_of,
     full_path,
-    problem_of,
+    parameter_of,
     reach_of,
     scenario_named,
-    scenario_of,
+    tolerance_parameters,
     with_numbers,
 )
 from ppafo.model.columns import at, over_runs
+from ppafo.parameters.overrides import read_overrides
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.faults import (
-    MINIMUM_SAMPLES,
     correlated_noise_of,
     is_at_limit,
     noise_of,
@@ -59,6 +60,7 @@ from ppafo.signals.recording import CHANNELS, Channel, Floats, Recording
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, SUPPLY, sample_period
 from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs, with_prescribed_angle
+from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.wording import count_of, first_twice
 
@@ -93,72 +95,51 @@ _MAXIMUM_RECORDS = 100_000
 class PreparedExperiment:
     """Experiment prepared for fitting: completed scenario, planned run, and samples located between its records.
 
-    ``measured`` has the samples at their times in the run; a fitted offset may shift them by up to ``reach`` [s].
-    ``run`` has the time step and clock of all runs. ``floors`` are the least noise by channel. ``inputs`` are those of
-    each step, computed from ``recorded``; None without recorded inputs.
+    ``measured`` has the samples at their times in the run. ``run`` has the time step and clock of all runs. ``inputs``
+    are those of each step; None without recorded inputs.
     """
 
     scenario: Scenario
     run: Run
     measured: Recording
-    floors: Mapping[str, float]
-    reach: float
-    recorded: RecordedInputs | None = None
-    inputs: StepInputs | None = None
+    inputs: StepInputs | None
 
 
-def prepare(experiment: FittedExperiment, numbers: Mapping[str, float], reach: float = 0.0) -> PreparedExperiment:
-    """Return an experiment prepared for fitting.
+def prepare(
+    experiment: FittedExperiment,
+    numbers: Mapping[str, float],
+    reach: float = 0.0,
+    step: float | None = None,
+    tolerance: float = FIT_TOLERANCE,
+) -> PreparedExperiment:
+    """Return an experiment prepared for fitting, with records that are no finer than its samples need.
 
-    ``numbers`` are the start values by path; ``reach`` [s] is the largest time offset that may be tried. Raises
-    IdentificationError for a recording with too few samples or a saturated sensor.
+    ``numbers`` are the start values by path; ``reach`` [s] is the largest time offset that may be tried, ``step`` [s]
+    the longest step of time, by default that of the scenario. Raises IdentificationError for a saturated sensor.
     """
-    recording, where = experiment.recording, f"experiment '{experiment.label}'"
+    recording, scenario = experiment.recording, experiment.begun
     inside = recording.time >= experiment.start - _FITS
     # Rounding may put the first sample just before the start.
     time = np.maximum(recording.time[inside] - experiment.start, 0.0)
-    if time.size < MINIMUM_SAMPLES:
-        raise IdentificationError(
-            f"{where}: {recording.label} has {time.size} samples from the start at {experiment.start:g} s on, but "
-            f"needs at least {MINIMUM_SAMPLES}"
-        )
     channels = {name: Channel(recording[name][inside], CHANNELS[name].unit) for name in experiment.channels}
-    actuator = experiment.scenario.device.actuator
-    stops = actuator.angle_min, actuator.angle_max
+    actuator = scenario.device.actuator
     for name, channel in channels.items():
         clipped = max(plateaus(channel.values), key=lambda plateau: plateau.count)
         # With a coarse converter, a vane that rests at its stop repeats one value without saturation of the sensor.
-        rests = name == ANGLE and any(abs(clipped.value - stop) < _ZERO_OF_ANGLE for stop in stops)
+        stops = (actuator.angle_min, actuator.angle_max) if name == ANGLE else ()
+        rests = any(abs(clipped.value - stop) < _ZERO_OF_ANGLE for stop in stops)
         has_noise = name in experiment.noise or noise_of(channel.values) > 0.0
         if is_at_limit(channel.values, clipped) and not (rests or has_noise):
             raise IdentificationError(
-                f"{where}: channel '{name}' stays at its {clipped.word} value for {clipped.count} of "
+                f"{experiment.where}: channel '{name}' stays at its {clipped.word} value for {clipped.count} of "
                 f"{channel.values.size} samples: the sensor is probably saturated"
             )
-    scenario = scenario_of(experiment)
-    scenario = replace(scenario, run=replace(scenario.run, duration=float(time[-1]) + reach))
-    recorded = RecordedInputs(recording, experiment.inputs, experiment.start) if experiment.inputs else None
-    measured = Recording(experiment.label, time, channels, kind=recording.kind)
-    return prepare_samples(scenario, measured, experiment.noise, reach, numbers, recorded)
-
-
-def prepare_samples(
-    scenario: Scenario,
-    measured: Recording,
-    floors: Mapping[str, float],
-    reach: float,
-    numbers: Mapping[str, float],
-    recorded: RecordedInputs | None = None,
-    tolerance: float = FIT_TOLERANCE,
-) -> PreparedExperiment:
-    """Return a prepared experiment from samples, at ``numbers`` [SI], with time offsets up to ``reach`` [s].
-
-    The records of its run are no finer than the samples need.
-    """
+    scenario = replace(
+        scenario, run=replace(scenario.run, duration=float(time[-1]) + reach, step=step or scenario.run.step)
+    )
     run = plan_run(with_numbers(scenario, numbers))
     # Steps between records: those of a sample interval, or fewer if samples must be interpolated, and a fraction of a
     # step if a whole one is too long for that.
-    time = measured.time
     every: float = max(1, round(float(np.min(np.diff(time))) / run.step))
     position = time / (run.step * every)
     is_aligned = bool(np.all(np.abs(position - np.round(position)) < _FITS * np.maximum(position, 1.0)))
@@ -172,10 +153,11 @@ def prepare_samples(
     records = math.ceil((float(time[-1]) + reach) / (run.step * every) - _FITS)
     steps = math.ceil(records * every - _FITS)
     run = replace(run, tolerance=tolerance, record_every=every, step_count=steps, needs_parts=True)
-    if recorded is not None and ANGLE in recorded.names and isinstance(scenario.motion, FreeMotion):
+    if ANGLE in experiment.inputs and isinstance(scenario.motion, FreeMotion):
         run = with_prescribed_angle(run, scenario.motion.angle)
-    inputs = None if recorded is None else step_inputs(recorded, scenario.device, run)
-    return PreparedExperiment(scenario, run, measured, floors, reach, recorded, inputs)
+    recorded = RecordedInputs(recording, experiment.inputs, experiment.start)
+    inputs = step_inputs(recorded, scenario.device, run) if experiment.inputs else None
+    return PreparedExperiment(scenario, run, Recording(experiment.label, time, channels, kind=recording.kind), inputs)
 
 
 def columns_in(label: str, numbers: Sequence[FitNumber], points: Floats) -> dict[str, Floats]:
@@ -197,13 +179,9 @@ def signals_of(
     A failed run is NaN throughout. Experiments run in parallel, one thread each.
     """
     columns = [columns_in(prepared.measured.label, numbers, points) for prepared in experiments]
-    arguments = experiments, columns, [points.shape[1]] * len(experiments)
-    workers = min(len(experiments), os.cpu_count() or 1)
-    if workers == 1:
-        return list(map(signals_at, *arguments))
     # Threads run at the same time, because compiled runs release the lock of the interpreter.
-    with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(signals_at, *arguments))
+    with ThreadPoolExecutor(min(len(experiments), os.cpu_count() or 1)) as pool:
+        return list(pool.map(signals_at, experiments, columns, [points.shape[1]] * len(experiments)))
 
 
 _NUMBERS_OF_RUN = (
@@ -235,64 +213,40 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
 def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
     """Return the channels [SI] (samples, runs) of one experiment for ``count`` runs with parameters [SI] by path.
 
-    Runs that differ only in zeros, gains and lags of compared sensors are simulated once. A pressure sensor reads gauge
-    pressure.
+    Runs that differ only in zeros, gains and lags of compared sensors are simulated once; runs with other zeros of
+    inputs are other batches. A pressure sensor reads gauge pressure.
     """
-    of_sensors = {f"{kind}{name}" for name in prepared.measured.names for kind in (ZERO_OF, GAIN_OF, LAG_OF)}
-    errors = {path: column for path, column in columns.items() if path in of_sensors}
-    running = {path: column for path, column in columns.items() if path not in errors}
-    table = np.array([np.broadcast_to(column, (count,)) for column in running.values()]).reshape(-1, count)
+    measured, inputs = prepared.measured, prepared.inputs
+    of_sensors = {f"{kind}{name}" for name in measured.names for kind in (ZERO_OF, GAIN_OF, LAG_OF)}
+    running = {path: np.broadcast_to(column, (count,)) for path, column in columns.items() if path not in of_sensors}
+    table = np.array([*running.values()]).reshape(-1, count)
     _, first, run_of = np.unique(table, axis=1, return_index=True, return_inverse=True)
-    distinct = {path: np.broadcast_to(column, (count,))[first] for path, column in running.items()}
-    signals = _ideal_signals(prepared, distinct, len(first))
-    atmosphere = prepared.scenario.device.supply.atmospheric_pressure
-    interval = sample_period(prepared.measured.time)
-    for name, values in signals.items():
-        rest = 0.0 if name == ANGLE else atmosphere
-        gain, zero = (np.asarray(errors.get(f"{path}{name}", 0.0)) for path in (GAIN_OF, ZERO_OF))
-        read = values[:, run_of.ravel()]
-        lags = np.broadcast_to(errors.get(f"{LAG_OF}{name}", 0.0), (count,))
-        # First-order lags, exact for straight lines between samples. A lag below 0 adds what the same lag above 0 takes
-        # away, so that a search can pass 0.
-        for lag in np.unique(lags[lags != 0.0]).tolist():
-            runs, left = lags == lag, math.exp(-interval / abs(lag))
-            straight = abs(lag) / interval * (1.0 - left)
-            from_start = read[:, runs] - read[:1, runs]
-            behind = lfilter([1.0 - straight, straight - left], [1.0, -left], from_start, axis=0) - from_start
-            read[:, runs] += math.copysign(1.0, lag) * behind
-        signals[name] = rest + (1.0 + gain) * (read - rest) + zero
-    return signals
-
-
-def _ideal_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
-    """Return the signals of ideal sensors [SI] (samples, runs); runs with other zeros of inputs are other batches."""
-    errors = {path.removeprefix(ZERO_OF): column for path, column in columns.items() if path.startswith(ZERO_OF)}
-    others = {path: column for path, column in columns.items() if not path.startswith(ZERO_OF)}
-    followed = [] if prepared.inputs is None else [*errors.values()]
-    distinct, group = np.unique(np.array(followed).reshape(-1, count), axis=1, return_inverse=True)
-    signals = {name: np.full((len(prepared.measured), count), np.nan) for name in prepared.measured.names}
-    for number, zeros in enumerate(distinct.T.tolist()):
+    others = {path: column[first] for path, column in running.items() if not path.startswith(ZERO_OF)}
+    followed = {path: column[first] for path, column in running.items() if path.startswith(ZERO_OF)}
+    zeros = np.array([] if inputs is None else [*followed.values()]).reshape(-1, len(first))
+    distinct, group = np.unique(zeros, axis=1, return_inverse=True)
+    signals = {name: np.full((len(measured), len(first)), np.nan) for name in measured.names}
+    for number, zeros_of_batch in enumerate(distinct.T.tolist()):
         chosen = np.flatnonzero(group.ravel() == number)
-        run = run_with(prepared, {path: column[chosen] for path, column in others.items()})
-        inputs = prepared.inputs
-        if inputs is not None and zeros:
+        run, read = run_with(prepared, {path: column[chosen] for path, column in others.items()}), inputs
+        if inputs is not None and zeros_of_batch:
             # Zero errors [rad], [Pa] are subtracted from recorded inputs; one sensor may measure both inlets.
-            zero_of = dict(zip(errors, zeros, strict=True))
-            both = zero_of.get(SUPPLY, 0.0)
+            zero_of = dict(zip(followed, zeros_of_batch, strict=True))
+            both = zero_of.get(f"{ZERO_OF}{SUPPLY}", 0.0)
             offsets = {
-                "path.level": zero_of.get(ANGLE, 0.0),
+                "path.level": zero_of.get(f"{ZERO_OF}{ANGLE}", 0.0),
                 "plant.supply_pressure": both,
-                "plant.dorsiflexion_pressure": zero_of.get(DORSIFLEXION_SUPPLY, both),
+                "plant.dorsiflexion_pressure": zero_of.get(f"{ZERO_OF}{DORSIFLEXION_SUPPLY}", both),
             }
-            read = {path: values - offsets.get(path, 0.0) for path, values in inputs.parameters.items()}
-            inputs = replace(inputs, parameters=read)
+            parameters = {path: values - offsets.get(path, 0.0) for path, values in inputs.parameters.items()}
+            read = replace(inputs, parameters=parameters)
         rows = state_row_numbers(run)
         channel_rows = [rows[f"state.{name}"] for name in ("angle", "mass_1", "mass_2")]
         records: Floats | None = None
         failed = np.zeros(len(chosen), dtype=np.bool_)
         # A program has up to 32 lanes; more runs are several batches.
         for members, batch in batches_of(run, len(chosen)):
-            outcome = run_batch(batch, threads=1) if inputs is None else replay(batch, inputs)
+            outcome = run_batch(batch, threads=1) if read is None else replay(batch, read)
             ends = outcome.states
             # A failed run, or one with states that are no numbers, has no residuals.
             failed[members] = (ends[rows["result.failure_time"]] < NEVER_FAILED) | ~np.isfinite(ends).all(axis=0)
@@ -301,7 +255,7 @@ def _ideal_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], 
             for record, row in zip(records, channel_rows, strict=True):
                 record[:, members] = outcome.record[:, row]
         assert records is not None
-        late = np.broadcast_to(others.get(TIME_OFFSET, np.array(0.0)), (count,))[chosen]
+        late = others[TIME_OFFSET][chosen] if TIME_OFFSET in others else np.zeros(len(chosen))
         states = [_at_samples(record, prepared, late) for record in records]
         numbers = leaves(run.plant)
         # Pressures follow from mass and angle by the plant, whose numbers differ from run to run.
@@ -312,6 +266,21 @@ def _ideal_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], 
             for name, values in zip(FITTED_CHANNELS, (angle, *pressures), strict=True):
                 if name in signals:
                     signals[name][:, chosen[element]] = values
+    interval = sample_period(measured.time)
+    for name, ideal in signals.items():
+        rest = 0.0 if name == ANGLE else prepared.scenario.device.supply.atmospheric_pressure
+        gain, zero = (np.asarray(columns.get(f"{path}{name}", 0.0)) for path in (GAIN_OF, ZERO_OF))
+        sensed = ideal[:, run_of.ravel()]
+        lags = np.broadcast_to(columns.get(f"{LAG_OF}{name}", 0.0), (count,))
+        # First-order lags, exact for straight lines between samples. A lag below 0 adds what the same lag above 0 takes
+        # away, so that a search can pass 0.
+        for lag in np.unique(lags[lags != 0.0]).tolist():
+            runs, left = lags == lag, math.exp(-interval / abs(lag))
+            straight = abs(lag) / interval * (1.0 - left)
+            from_start = sensed[:, runs] - sensed[:1, runs]
+            behind = lfilter([1.0 - straight, straight - left], [1.0, -left], from_start, axis=0) - from_start
+            sensed[:, runs] += math.copysign(1.0, lag) * behind
+        signals[name] = rest + (1.0 + gain) * (sensed - rest) + zero
     return signals
 
 
@@ -386,10 +355,6 @@ class TrajectoryFit(Identified):
     scenarios: tuple[Scenario, ...]
     expected: "tuple[ExpectedBenefit, ...]" = ()
 
-    def estimate(self, name: str) -> Estimate:
-        """Return the estimate at a path; ``valve.area`` means the valve of the first experiment."""
-        return {estimate.path: estimate for estimate in self.estimates}[full_path(name, self.scenarios[0])]
-
 
 def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> TrajectoryFit:
     """Fit the parameters of a problem to its recordings; each estimate has an interval [SI] and a verdict.
@@ -442,36 +407,32 @@ def _fit_of(problem: TrajectoryProblem, numbers: tuple[FitNumber, ...], report: 
             )
         excess = min(max(static.start - dynamic.start, low), high)
         sought[row] = replace(static, start=excess, low=low, high=high, scale=dynamic.scale, base=dynamic.name)
-    runs = []
+    runs, finer = list[PreparedExperiment](), list[PreparedExperiment]()
     for experiment in problem.experiments:
         reach = reach_of([number for number in numbers if number.acts_in(experiment.label)])
-        runs.append(prepare(experiment, numbers_in(experiment.label, numbers, start), reach))
+        values = numbers_in(experiment.label, numbers, start)
+        runs.append(prepare(experiment, values, reach))
+        # The error of the integration is nearly proportional to the tolerance, so that finer runs show most of it. It
+        # is no independent noise: all samples of a recording share it.
+        finer.append(prepare(experiment, values, reach, 0.5 * runs[-1].run.step, _FINER * FIT_TOLERANCE))
     report(Progress(f"trajectory fit: {count_of(len(numbers), 'number')}, {count_of(len(runs), 'recording')}"))
-    # The error of the integration is nearly proportional to the tolerance, so that finer runs show most of it. It is no
-    # independent noise: all samples of a recording share it.
-    finer = []
-    for run in runs:
-        scenario = replace(run.scenario, run=replace(run.scenario.run, step=0.5 * run.run.step))
-        values = numbers_in(run.measured.label, numbers, start)
-        known = run.measured, run.floors, run.reach, values, run.recorded
-        finer.append(prepare_samples(scenario, *known, tolerance=_FINER * FIT_TOLERANCE))
     blocks, first = list[ResidualBlock](), 0
-    coarse, fine = (signals_of(each, numbers, start[:, None]) for each in (runs, finer))
-    for run, coarse_signals, fine_signals in zip(runs, coarse, fine, strict=True):
+    for experiment, run, *both in zip(
+        problem.experiments, runs, *(signals_of(each, numbers, start[:, None]) for each in (runs, finer)), strict=True
+    ):
         for name in run.measured.names:
-            samples = run.measured[name]
-            error = (fine_signals[name][:, 0] - coarse_signals[name][:, 0]) / (1.0 - _FINER)
+            samples, (coarse, fine) = run.measured[name], (signals[name][:, 0] for signals in both)
+            error = (fine - coarse) / (1.0 - _FINER)
             error = error if np.isfinite(error).all() else np.zeros_like(error)
-            floor = max(run.floors.get(name, 0.0), float(np.sqrt(np.mean(np.square(error)))))
+            floor = max(experiment.noise.get(name, 0.0), float(np.sqrt(np.mean(np.square(error)))))
             least = np.maximum(floor, rounding_of(samples, resolution_of(samples)))
-            blocks.append(ResidualBlock(run.measured.label, name, slice(first, first + len(samples)), least, error))
+            blocks.append(ResidualBlock(experiment.label, name, slice(first, first + len(samples)), least, error))
             first += len(samples)
 
     def residuals(points: Floats) -> Floats:
-        signals = signals_of(runs, numbers, points)
-        pairs = ((run.measured, model) for run, model in zip(runs, signals, strict=True))
+        pairs = zip(runs, signals_of(runs, numbers, points), strict=True)
         return np.concatenate(
-            [measured[name][:, None] - model[name] for measured, model in pairs for name in measured.names]
+            [run.measured[name][:, None] - model[name] for run, model in pairs for name in run.measured.names]
         )
 
     for variables in (sought, numbers):
@@ -496,23 +457,38 @@ def _result(
     for measured, signals in zip(measurements, signals_of(runs, numbers, fitted.values[:, None]), strict=True):
         modelled = {name: Channel(column[:, 0], measured.unit(name)) for name, column in signals.items()}
         models.append(Recording(f"model of {measured.label}", measured.time, modelled, kind="simulated"))
-    channels, outliers = list[ChannelFit](), list[str]()
+    channels, outliers, conflicts = (
+        list[ChannelFit](),
+        list[str](),
+        ["" if fitted.conflict is None else fitted.conflict.words],
+    )
+    for number in (number for number in numbers if number.path.startswith(ZERO_OF)):
+        # The zero error of a sensor stays within its limit, so a larger drift is due to the model.
+        name, limit = number.path.removeprefix(ZERO_OF), math.sqrt(3.0) * number.deviation
+        noise = fitted.sensors.get(name, Noise(0.0))
+        wander = noise.deviation * math.sqrt(max(1.0 - noise.innovation**2, 0.0))
+        if wander > limit:
+            drift, most = (shown_text(size, number.unit, digits=2) for size in (wander, limit))
+            conflicts.append(f"the residual of {name} drifts by {drift}, but the zero of its sensor by at most {most}")
     for (measured, name, residuals), block in zip(_residuals(measurements, models), blocks, strict=True):
-        sensor, rms = fitted.sensors[name], float(np.sqrt(np.mean(residuals * residuals)))
-        sizes = rms, float(np.max(np.abs(residuals))), float(np.ptp(measured[name]))
-        channels.append(ChannelFit(measured.label, name, measured.unit(name), sensor.deviation, sensor.order, *sizes))
+        sensor, lasting = fitted.sensors[name], correlated_noise_of(residuals)
+        rms, span = float(np.sqrt(np.mean(np.square(residuals)))), float(np.ptp(measured[name]))
+        sizes = sensor.deviation, sensor.order, rms, float(np.max(np.abs(residuals))), span
+        channels.append(ChannelFit(measured.label, name, measured.unit(name), *sizes))
+        if rms > _BURST * lasting and rms > _FELT * span:
+            times = f"{rms / max(lasting, 1.0e-300):.0f} times the noise that lasts"
+            conflicts.append(f"the residual of {name} of {measured.label} is {times}")
         left_out = [row - block.rows.start for row in fitted.outliers if block.rows.start <= row < block.rows.stop]
         if left_out:
             count, first = count_of(len(left_out), "outlier"), measured.time[left_out[0]]
             outliers.append(f"experiment '{measured.label}': {count} of {name} left out, the first at {first:.6g} s")
-    conflict = conflict_in_words(fitted) or _wandering(fitted) or _bursting(measurements, models)
+    conflict = next(iter(conflicts), "")
     # Tolerances are marginalised: their rows are left out, their share of the variance stays.
     rows = [row for row, number in enumerate(numbers) if not number.is_tolerance]
     estimates = []
     for row in rows:
         acting = [one for one in problem.experiments if numbers[row].acts_in(one.label)]
-        sources = [one.source or one.recording.label for one in acting]
-        estimates.append(estimate_of(fitted, row, sources, conflict))
+        estimates.append(estimate_of(fitted, row, [one.trace for one in acting], conflict))
     errors, known = np.sqrt(np.diag(fitted.covariance)), list[NuisanceParameter]()
     for number, value, error in zip(numbers, fitted.values.tolist(), errors.tolist(), strict=True):
         if number.is_tolerance:
@@ -557,45 +533,18 @@ def _result(
     )
 
 
-def _wandering(fitted: Fit) -> str:
-    """Return a sentence on a channel whose residual drifts beyond the limit of its zero error; empty if none does.
+def candidate_of(
+    label: str, scenario: Scenario, noise: Mapping[str, float], interval: float = 1.0e-3
+) -> FittedExperiment:
+    """Return a candidate for the next experiment: scenario, noise of each channel [rad], [Pa], sample interval [s].
 
-    The zero error of a sensor stays within its limit, so a larger drift is due to the model.
+    Without ``noise``, all channels of the fit are compared, each with its estimated noise; otherwise only the channels
+    in ``noise``.
     """
-    for number in (number for number in fitted.numbers if number.path.startswith(ZERO_OF)):
-        channel, unit = number.path.removeprefix(ZERO_OF), number.unit.removesuffix("_d")
-        noise, limit = fitted.sensors.get(channel), math.sqrt(3.0) * number.deviation
-        if noise is None or not math.isfinite(limit):
-            continue
-        wander = noise.deviation * math.sqrt(max(1.0 - noise.innovation**2, 0.0))
-        if wander > limit:
-            drift, most = (shown_text(size, unit, digits=2) for size in (wander, limit))
-            return f"the residual of {channel} drifts by {drift}, but the zero of its sensor by at most {most}"
-    return ""
-
-
-def _bursting(measurements: Sequence[Recording], models: Sequence[Recording]) -> str:
-    """Return a sentence on a channel whose residuals are far above the noise that lasts; empty if there is none."""
-    for measured, name, residuals in _residuals(measurements, models):
-        size, noise = float(np.sqrt(np.mean(np.square(residuals)))), correlated_noise_of(residuals)
-        if size > _BURST * noise and size > _FELT * float(np.ptp(measured[name])):
-            times = size / max(noise, 1.0e-300)
-            return f"the residual of {name} of {measured.label} is {times:.0f} times the noise that lasts"
-    return ""
-
-
-@dataclass(frozen=True, slots=True)
-class CandidateExperiment:
-    """Candidate for the next experiment: scenario, noise of each channel [rad], [Pa], and sample interval [s].
-
-    The device comes from the scenario, with the fitted values inserted. Without ``noise``, all channels of the fit are
-    compared, each with its estimated noise; otherwise only the channels in ``noise``.
-    """
-
-    label: str
-    scenario: Scenario
-    noise: Mapping[str, float]
-    interval: float = 1.0e-3
+    count = math.floor(scenario.run.duration / interval + _FITS)
+    times = interval * np.arange(count + 1, dtype=np.float64)
+    samples = {name: Channel(np.zeros(times.size), CHANNELS[name].unit) for name in FITTED_CHANNELS}
+    return FittedExperiment(label, scenario, Recording(label, times, samples), noise=noise)
 
 
 @dataclass(frozen=True, slots=True)
@@ -613,7 +562,7 @@ class ExpectedBenefit:
     most_helped: str
 
 
-def expected_information(fit: TrajectoryFit, candidates: Sequence[CandidateExperiment]) -> tuple[ExpectedBenefit, ...]:
+def expected_information(fit: TrajectoryFit, candidates: Sequence[FittedExperiment]) -> tuple[ExpectedBenefit, ...]:
     """Return the expected benefit of each candidate experiment, the most informative first.
 
     The whitened Jacobian of a candidate is added to the information of the fit.
@@ -628,12 +577,8 @@ def expected_information(fit: TrajectoryFit, candidates: Sequence[CandidateExper
     before = found.covariance / np.outer(errors, errors)
     for candidate in candidates:
         noise = dict(candidate.noise) or {name: model.deviation for name, model in sensors.items()}
-        count = math.floor(candidate.scenario.run.duration / candidate.interval + _FITS)
-        times = candidate.interval * np.arange(count + 1, dtype=np.float64)
-        samples = {name: Channel(np.zeros(times.size), CHANNELS[name].unit) for name in noise}
-        measured = Recording(candidate.label, times, samples)
         start = numbers_in(candidate.label, numbers, point)
-        run = prepare_samples(candidate.scenario, measured, noise, reach_of(numbers), start)
+        run = prepare(replace(candidate, noise=noise, channels=tuple(noise)), start, reach_of(numbers))
 
         def signals(points: Floats, run: PreparedExperiment = run) -> Floats:
             (modelled,) = signals_of([run], numbers, points)
@@ -642,7 +587,8 @@ def expected_information(fit: TrajectoryFit, candidates: Sequence[CandidateExper
         runs = FitRuns(signals, numbers, (), report_nothing, 0, is_motion=True)
         with refused_as(IdentificationError, f"candidate '{candidate.label}'", IdentificationError):
             # As in the fit, a difference is as long as changes the samples by three units of noise in all.
-            runs.adapt_steps(runs.jacobian(point / runs.scale), 1.0 / np.repeat(list(noise.values()), times.size))
+            deviations = np.repeat(list(noise.values()), len(run.measured))
+            runs.adapt_steps(runs.jacobian(point / runs.scale), 1.0 / deviations)
             slopes = np.asarray(runs.jacobian(point / runs.scale) / runs.scale)
         blocks = []
         for block, (name, deviation) in zip(np.split(slopes, len(noise)), noise.items(), strict=True):
@@ -667,11 +613,25 @@ def solve_section(
 ) -> TrajectoryFit:
     """Solve section [trajectory]: fit the parameters and rank the candidates, after a check of all inputs.
 
-    ``bench`` are estimates of bench procedures by path, ``used`` the recordings from which these were obtained.
+    Set and valve are those of all scenarios. ``bench`` are estimates of bench procedures by path, ``used`` the
+    recordings from which these were obtained.
     """
     try:
-        problem, candidates = problem_of(section, context, reader, bench, used), list[CandidateExperiment]()
-        labels = [experiment.label for experiment in problem.experiments]
+        experiments = tuple(experiment_of(entry, context, reader) for entry in section.experiments)
+        parameters = [parameter_of(entry, experiments, bench) for entry in section.parameters]
+        for entry, experiment in zip(section.experiments, experiments, strict=True):
+            free = {full_path(item.path, experiment.scenario) for item in parameters if item.acts_in(entry.label)}
+            for override in read_overrides(entry.overrides):
+                if full_path(override.typed, experiment.scenario) in free:
+                    why = f"overrides: {override.typed} is fitted; give its start in [[trajectory.parameters]]"
+                    raise IdentificationError(f"{experiment.where}: {why}")
+            if (limit := entry.time_offset) is not None:
+                # The delay of the samples of one recording is known within a limit, as a tolerance is.
+                bounds = 0.0, -limit, limit, 1.0, deviation_of_limit(limit)
+                parameters.append(FitNumber(TIME_OFFSET, *bounds, (entry.label,), is_tolerance=True))
+        tolerances = tolerance_parameters(context.tolerances, experiments, parameters, context.parameter_set)
+        problem = TrajectoryProblem((*parameters, *tolerances), experiments, section.confidence, used)
+        labels, candidates = [experiment.label for experiment in experiments], list[FittedExperiment]()
         if twice := first_twice([*labels, *(one.label for one in section.candidates)]):
             raise IdentificationError(f"candidate '{twice}': another experiment or candidate has this label")
         for one in section.candidates:
@@ -680,12 +640,10 @@ def solve_section(
                 raise IdentificationError(
                     f"candidate '{one.label}': interval = {one.interval:g} s must be at most {longest:g} s"
                 )
-            candidates.append(CandidateExperiment(one.label, scenario, one.noise.by_channel(), one.interval))
+            candidates.append(candidate_of(one.label, scenario, one.noise.by_channel(), one.interval))
         fitted = fit(problem, report)
         expected = expected_information(fitted, candidates)
     except (IdentificationError, DataError) as error:
-        if str(error).startswith(context.label):
-            raise
         raise type(error)(f"{context.label}: {error}") from error
     sources = tuple(RecordingSource(experiment.recording, experiment.source) for experiment in problem.experiments)
     remarks = [*remarks_on_readings(sources), *fitted.remarks]

@@ -40,7 +40,7 @@ def test_a_planted_discharge_coefficient_lies_inside_its_interval_which_names_th
     result = open_valve_flow((planted.flow(),), gas, area=31.6e-6)
     found = result["valves.proportional.discharge_coefficient"]
     assert found.low <= 3.57 / 31.6 <= found.high
-    assert 0.025 < found.half_width / found.value < 0.06
+    assert 0.025 < found.wider_half_width / found.value < 0.06
     assert "variance from gas temperature" in found.explanation
     assert (found.verdict, result.conflict) == ("identified", "")
 
@@ -228,7 +228,7 @@ def test_a_planted_orifice_leak_gives_its_area_whichever_chamber_empties(turned:
         tolerances=Tolerances(held=0.01 * math.sqrt(3.0)),
     )[AREA]
     assert area.low <= 0.3e-6 <= area.high
-    assert area.half_width < 0.05 * area.value
+    assert area.wider_half_width < 0.05 * area.value
     assert area.verdict == "identified"
 
 

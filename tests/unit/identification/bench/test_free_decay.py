@@ -50,7 +50,7 @@ def test_planted_damping_and_friction_lie_inside_their_intervals(sign: float) ->
         ("friction.dynamic_torque", planted.DECELERATION),
     ):
         assert result[path].low <= 8.4e-3 * ratio <= result[path].high
-        assert result[path].half_width < 0.03 * result[path].value
+        assert result[path].wider_half_width < 0.03 * result[path].value
     assert result.conflict == ""
 
 
@@ -63,7 +63,7 @@ def test_several_impulses_share_one_damping() -> None:
     path = "free_decay.damping_over_inertia"
     one = free_decay((planted.decay(seed=1),), rise=0.0)[path]
     three = free_decay(tuple(planted.decay(seed=seed) for seed in (1, 2, 3)), rise=0.0)[path]
-    assert three.half_width < 0.8 * one.half_width
+    assert three.wider_half_width < 0.8 * one.wider_half_width
     assert len(three.recordings) == 3
 
 
@@ -76,7 +76,7 @@ def test_an_unknown_inertia_leaves_only_ratios_and_says_so() -> None:
 def test_an_uncertain_inertia_widens_what_depends_on_it() -> None:
     known = Tolerances(held=0.1)
     damping = free_decay((planted.decay(),), "8.4 g m^2", 0.0, known)["friction.viscous_damping"]
-    assert damping.half_width / damping.value == pytest.approx(0.1 / np.sqrt(3.0) * 1.96, rel=0.05)
+    assert damping.wider_half_width / damping.value == pytest.approx(0.1 / np.sqrt(3.0) * 1.96, rel=0.05)
     assert "inertia" in damping.explanation
 
 
@@ -160,7 +160,7 @@ def with_velocity(factor: float = 1.0) -> RecordingSource:
 def test_a_recorded_velocity_makes_the_interval_narrower_and_it_holds() -> None:
     path = "free_decay.damping_over_inertia"
     alone, both = (free_decay((one,), rise=0.0)[path] for one in (planted.decay(), with_velocity()))
-    assert both.half_width < 0.8 * alone.half_width
+    assert both.wider_half_width < 0.8 * alone.wider_half_width
     assert both.low <= planted.DAMPING_RATE <= both.high
 
 

@@ -37,7 +37,7 @@ def test_the_gains_of_the_sensors_widen_the_torque_constant_and_are_named() -> N
         static_torque((planted.static(),), tolerances=item)["actuator.torque_constant"]
         for item in (Tolerances(), known)
     )
-    assert usual.half_width > 1.2 * exact.half_width
+    assert usual.wider_half_width > 1.2 * exact.wider_half_width
     assert "gain of the pressure sensor" in usual.explanation
     assert "gain" not in exact.explanation
 
@@ -76,7 +76,7 @@ def test_samples_of_a_stroke_are_one_reading() -> None:
     repeated = static_torque((planted.source("many", np.arange(50.0 * len(once)), **many),))
     single = static_torque((planted.static(),))
     path = "friction.static_torque"
-    assert repeated[path].half_width == pytest.approx(single[path].half_width, rel=1e-3)
+    assert repeated[path].wider_half_width == pytest.approx(single[path].wider_half_width, rel=1e-3)
 
 
 def test_a_direction_that_is_turned_round_is_told_and_not_fitted() -> None:

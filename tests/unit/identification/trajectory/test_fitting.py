@@ -42,9 +42,9 @@ def test_three_planted_values_are_found_and_called_identified(three: TrajectoryF
     for estimate in three.estimates:
         assert estimate.verdict == "identified"
         assert {type(number) for number in (estimate.value, estimate.low, estimate.high)} == {float}
-        assert estimate.half_width < 0.02 * estimate.value
+        assert estimate.wider_half_width < 0.02 * estimate.value
         # Three standard errors: 3/1.96 half widths.
-        assert abs(estimate.value - number_at(step, estimate.path)) < 3.0 / 1.96 * estimate.half_width
+        assert abs(estimate.value - number_at(step, estimate.path)) < 3.0 / 1.96 * estimate.wider_half_width
         assert estimate.recordings == ("synthetic step-response",)
 
 
@@ -63,7 +63,7 @@ def test_a_search_that_ends_where_no_run_succeeds_says_which_number_is_favoured(
     ended = dataclasses.replace(three.fit, has_converged=False, edge={"foot_plate.inertia": 1})
     monkeypatch.setattr(fitting, "fit_residuals", lambda *_arguments, **_settings: ended)
     (remark,) = fit(three.problem).faults
-    value = three.estimate("foot_plate.inertia").value
+    value = three["foot_plate.inertia"].value
     assert f"the recordings favour foot_plate.inertia above {value:.4g} kg m^2, where every run fails" in remark
     assert "before it converged" not in remark
 
@@ -77,12 +77,12 @@ def test_fitted_runs_are_those_of_a_simulation_with_the_estimates(three: Traject
 
 def test_covariance_and_interval_belong_together(three: TrajectoryFit) -> None:
     errors = np.sqrt(np.diag(three.covariance))
-    inertia = three.estimate("foot_plate.inertia")
-    assert inertia.half_width == pytest.approx(1.96 * errors[1], rel=0.02)
+    inertia = three["foot_plate.inertia"]
+    assert inertia.wider_half_width == pytest.approx(1.96 * errors[1], rel=0.02)
 
 
 def test_an_estimate_is_found_by_the_short_path_of_the_valve(three: TrajectoryFit) -> None:
-    assert three.estimate("valve.discharge_coefficient") is three.estimates[0]
+    assert three["valves.proportional.discharge_coefficient"] is three.estimates[0]
 
 
 def test_columns_are_the_runs_that_simulate_makes_with_less_error(experiment: FittedExperiment) -> None:
@@ -102,7 +102,7 @@ def test_area_and_discharge_coefficient_are_not_identifiable_together(experiment
     found = fitted(experiment, FLOW, FitNumber("valve.area"), INERTIA)
     assert [one.verdict for one in found.estimates] == ["not identifiable", "not identifiable", "identified"]
     assert "trades off against valves.proportional.area" in found.estimates[0].explanation
-    product = found.values["valves.proportional.area"] * found.values["valves.proportional.discharge_coefficient"]
+    product = found["valves.proportional.area"].value * found["valves.proportional.discharge_coefficient"].value
     assert product == pytest.approx(31.6e-6 * 0.113, rel=3e-3)
 
 
@@ -111,15 +111,15 @@ def test_a_number_that_does_nothing_is_not_identifiable_and_says_so(experiment: 
     start = {"initial.pressure_2": experiment.scenario.initial.pressure_2}
     apart = dataclasses.replace(experiment, scenario=with_numbers(experiment.scenario, start))
     found = fitted(apart, INERTIA, FitNumber("supply.dorsiflexion_pressure"))
-    assert found.estimate("supply.dorsiflexion_pressure").verdict == "not identifiable"
+    assert found["supply.dorsiflexion_pressure"].verdict == "not identifiable"
     said = "the recordings are hardly sensitive to this parameter"
-    assert found.estimate("supply.dorsiflexion_pressure").explanation == said
-    assert found.estimate("foot_plate.inertia").verdict == "identified"
+    assert found["supply.dorsiflexion_pressure"].explanation == said
+    assert found["foot_plate.inertia"].verdict == "identified"
 
 
 def test_a_bound_that_keeps_the_truth_out_is_named(experiment: FittedExperiment) -> None:
     found = fitted(experiment, FLOW, FitNumber("foot_plate.inertia", start=0.012, low=0.010, high=0.02))
-    inertia = found.estimate("foot_plate.inertia")
+    inertia = found["foot_plate.inertia"]
     assert inertia.verdict == "at its bound"
     assert "at or beyond 0.01 kg m^2" in inertia.explanation
     assert inertia.value == pytest.approx(0.010, rel=1e-6)
@@ -130,7 +130,7 @@ def test_a_model_that_lacks_something_holds_for_itself_only(experiment: FittedEx
         "step-response", ["motion.kind=free", "run.duration=0.35 s", "foot_plate.gravity_torque=0.4 N m"]
     )
     poor = fitted(dataclasses.replace(experiment, scenario=loaded), FLOW)
-    assert abs(poor.estimates[0].value - 0.113) > poor.estimates[0].half_width
+    assert abs(poor.estimates[0].value - 0.113) > poor.estimates[0].wider_half_width
     assert poor.estimates[0].verdict == "holds for this model only"
     assert not poor.estimates[0].is_identified
     assert "fitted alone, " in poor.conflict
@@ -138,18 +138,18 @@ def test_a_model_that_lacks_something_holds_for_itself_only(experiment: FittedEx
 
 def test_a_prior_decides_where_the_recordings_are_silent(experiment: FittedExperiment) -> None:
     found = fitted(experiment, FLOW, FitNumber("valve.area", start=31.6e-6, deviation=0.316e-6))
-    area = found.estimate("valve.area")
+    area = found["valves.proportional.area"]
     assert area.value == pytest.approx(31.6e-6, rel=1e-3)
-    assert area.half_width == pytest.approx(0.0196 * area.value, rel=0.05)
-    assert found.estimate("valve.discharge_coefficient").verdict == "identified"
-    assert "valves.proportional.area" in found.estimate("valve.discharge_coefficient").explanation
+    assert area.wider_half_width == pytest.approx(0.0196 * area.value, rel=0.05)
+    assert found["valves.proportional.discharge_coefficient"].verdict == "identified"
+    assert "valves.proportional.area" in found["valves.proportional.discharge_coefficient"].explanation
 
 
 def test_an_initial_pressure_of_one_recording_is_found(experiment: FittedExperiment) -> None:
     start = FitNumber("initial.pressure_2", start=4.4e5, low=4.0e5, high=5.2e5, recordings=("step",))
     (estimate,) = fitted(experiment, start).estimates
     assert (estimate.path, estimate.unit) == ("initial.pressure_2 of step", "Pa")
-    assert abs(estimate.value - experiment.scenario.initial.pressure_2) < 3.0 / 1.96 * estimate.half_width
+    assert abs(estimate.value - experiment.scenario.initial.pressure_2) < 3.0 / 1.96 * estimate.wider_half_width
     assert estimate.verdict == "identified"
 
 
@@ -200,4 +200,4 @@ def test_a_cylinder_is_fitted_as_a_vane_is(recorded: Callable[..., Recording]) -
     (estimate,) = fitted(experiment, FitNumber(path, start=0.8 * truth)).estimates
 
     assert estimate.verdict == "identified"
-    assert abs(estimate.value - truth) < 3.0 / 1.96 * estimate.half_width < 0.1 * truth
+    assert abs(estimate.value - truth) < 3.0 / 1.96 * estimate.wider_half_width < 0.1 * truth

@@ -36,7 +36,7 @@ def test_a_leak_beside_the_delay_of_a_valve_is_not_identifiable_and_its_interval
 
     found = fitted(FittedExperiment("step", scenario, recording), *sought)
 
-    leak = found.estimate("actuator.leak.area")
+    leak = found["actuator.leak.area"]
     assert leak.verdict == "not identifiable"
     assert leak.low < 0.1 * LEAK
     assert leak.high > 50.0 * LEAK

@@ -94,8 +94,8 @@ def test_bounds_of_friction_change_nothing_where_they_are_wide(
         assert estimate.verdict == "identified", estimate.explanation
         assert estimate.low <= PLANTED[estimate.path] <= estimate.high
     # The start of the scenario is as inexact as the sensor, so that its error does not pass for a drift.
-    assert all(found.estimate(path).half_width < 0.1 * PLANTED[path] for path in list(PLANTED)[:3])
-    assert found.values["friction.static_torque"] >= found.values["friction.dynamic_torque"]
+    assert all(found[path].wider_half_width < 0.1 * PLANTED[path] for path in list(PLANTED)[:3])
+    assert found["friction.static_torque"].value >= found["friction.dynamic_torque"].value
 
 
 def test_friction_at_rest_keeps_the_bounds_that_it_was_given(swing: FittedExperiment) -> None:

@@ -40,7 +40,7 @@ def test_bounds_and_scale_follow_from_the_declaration(experiment: FittedExperime
         (FitNumber("foot_plate.inertia", low=1.0, high=2.0), "must lie between the bounds"),
         (FitNumber("foot_plate.inertia", high=5.0e3), "exceed the allowed range"),
         (FitNumber("actuator.torque_constant", start=0.0, low=0.0), "start = 0 needs bounds"),
-        (FitNumber("foot_plate.inertia", deviation=0.0), "standard deviation of a prior"),
+        (FitNumber("foot_plate.inertia", deviation=0.0), "standard deviation of its prior"),
         (FitNumber("foot_plate.inertia", recordings=("stop",)), "did you mean 'step'"),
         (FitNumber("foot_plate.weight"), "'foot_plate.weight' cannot be fitted"),
     ],

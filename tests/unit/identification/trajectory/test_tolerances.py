@@ -189,7 +189,7 @@ def test_errors_of_the_bench_hide_no_number_where_they_are_tolerances(recorded: 
     plain = fit(TrajectoryProblem(free, experiments))
     stated = fit(TrajectoryProblem((*free, *tolerance_parameters(Tolerances(), experiments, free)), experiments))
 
-    without, with_them = plain.estimate("foot_plate.inertia"), stated.estimate("foot_plate.inertia")
+    without, with_them = plain["foot_plate.inertia"], stated["foot_plate.inertia"]
     assert not without.low <= inertia <= without.high
     assert without.verdict == "holds for this model only"
     assert with_them.low <= inertia <= with_them.high
