@@ -36,9 +36,7 @@ Indices = NDArray[np.intp]
 Residuals = Callable[[Floats], Floats]
 """Function from points [SI] (numbers, points) to residuals measured - model [SI] (rows, points); NaN if a run fails."""
 _UNITS_OF_NOISE = 3.0
-"""Combined change of all residuals in a finite difference, in units of noise [-].
-
-Differences of a thousandth of the variable, or of thirty units of noise, gave fewer intervals with the true value."""
+"""Combined change of all residuals in a finite difference [noises]; with 30 fewer intervals held the true value."""
 _SHORTEST_STEP, _LONGEST_STEP = 1.0e-7, 1.0e-3
 """Shortest and longest finite difference, as fractions of the scale of a variable [-]."""
 _LEAST_NOISE = 1.0e-12
@@ -46,9 +44,8 @@ _LEAST_NOISE = 1.0e-12
 _OF_ANY_SIZE = 1.0e8
 """Standard deviation of an error of unknown magnitude, relative to the noise [-]."""
 _ROUNDS, _EVALUATIONS, _GAUSS_NEWTON, _TRIES, _STEPS = 20, 40, 40, 10, 12
-"""Largest numbers of iterations between noise and variables, of evaluations in each pass of the search, of steps on
-whitened samples, of trial points per limit, and of steps of the other variables at each.
-"""
+"""Largest numbers of iterations between noise and variables, evaluations in a pass of the search, steps on whitened
+samples, trial points per limit, and steps of the other variables at each."""
 _SHORT, _SHARES = 0.1, np.array([1.0, 0.5, 0.25])[:, None]
 """Shortest fraction of a step, from which its curvature is found too, and the longer ones; the best is taken [-]."""
 _STILL = 1.0e-3
@@ -64,10 +61,7 @@ _AWAY = 0.1
 SHAPE = "shape"
 """Marker in ``Conflict.number`` for residuals whose neighbours have the same sign; the law has another shape."""
 _SMOOTHEST = 0.15
-"""Relative innovation [-] below which residuals do not count as noise; a first-order lag of 90 samples gives 0.15.
-
-Noise with a lag of 33 samples, 0.24, is estimated down to 0.19 in two recordings of 500 samples.
-"""
+"""Relative innovation [-] below which residuals are no noise: a lag of 90 samples, whereas 33 give 0.19 to 0.24."""
 _SIGNIFICANCE, _BY_CHANCE = 0.01, 0.001
 """Significance levels of a difference between estimates, and of residuals that follow each other (3.1 errors) [-]."""
 _PARTING = 0.05
@@ -91,9 +85,7 @@ _NEAR = 1.0e-3
 _NONE = 0.1
 """Upper end of an interval that begins at zero [typical magnitudes], below which the part is none."""
 _BETTER, _OTHER_STARTS = 1.0, 32
-"""Number of other starts for a fit that is inconsistent or has not converged, and the increase of the log-likelihood
-[-] above which one replaces it; equal optima do not.
-"""
+"""Increase of the log-likelihood [-] by which another start replaces the first result, and number of such starts."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,6 @@ SAMPLES_PER_COEFFICIENT = 100
 """Least number of samples per autoregression coefficient; 100 white samples then get order 0 in 7 of 10 fits."""
 _LARGEST_REFLECTION = 1.0 - 1.0e-9
 """Largest reflection coefficient [-]; residuals that follow a law exactly, such as a constant, leave no innovation."""
-
 _GAINS = tuple(2.0**-power for power in range(1, 9))
 """Trial gains of a drifting level [-]; with a smaller gain the level would not move within some hundred samples."""
 

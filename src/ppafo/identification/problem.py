@@ -31,8 +31,6 @@ SHORTEST_STEP = 1.0e-6
 _FILE = TomlKind(
     "identification problem", "identification", resources.files("ppafo.identification"), IdentificationError
 )
-
-
 _above_zero = partial(Number, minimum=0.0, minimum_allowed=False)
 
 

@@ -100,11 +100,8 @@ _EXACT = ("area", "angle_min", "angle_max", "linear_ratio", "critical_ratio", "a
 """Parameters without a default tolerance, because another parameter or a zero error has the same effect."""
 _STRIBECK, _SHARE = "effects.stribeck.velocity", "effects.stribeck.share"
 _FACTOR, _ONE_SIDED, _LEAST = 1.5, 1.645, 0.01
-"""Prior of the Stribeck velocity: standard deviation of its logarithm, distance of the limit from the mean in standard
-deviations, and least value as a fraction of the limit [-].
-
-At the least value the fall of the friction is practically abrupt; at 0 the effect would be off.
-"""
+"""Prior of the Stribeck velocity: standard deviation of its logarithm, distance of the limit from its mean [-],
+and least value [limits], at which the fall of the friction is practically abrupt; at 0 the effect would be off."""
 _START_OF_ANGLE = math.radians(0.05)
 """Standard deviation of an initial angle read from a recording [rad]."""
 

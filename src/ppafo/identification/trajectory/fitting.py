@@ -81,10 +81,8 @@ _FINER = 0.25
 """Relative tolerance [-] of the finer runs by which the integration error is estimated."""
 _FITS = 1.0e-6
 """Rounding tolerance of sample times, as a fraction of an interval [-], and in seconds."""
-
 _ZERO_OF_ANGLE = math.radians(1.0)
 """Largest distance of a reading from a stop [rad] at which the vane counts as resting at the stop."""
-
 _READ_INTERVAL = 5.0e-5
 """Record interval for interpolation at samples [s]; a chamber fills within milliseconds."""
 _MAXIMUM_RECORDS = 100_000
