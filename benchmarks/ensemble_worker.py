@@ -17,7 +17,7 @@ from benchmarks.task import ensemble
 from benchmarks.timing import time_in_turn
 from ppafo.engine.lanes import Batch, Floats, run_batch
 from ppafo.metrics import gas, switching, tracking
-from ppafo.simulation.ensemble.running import MeteredRuns, OutputRequest
+from ppafo.simulation.ensemble import MeteredRuns, OutputRequest
 
 
 @dataclass(frozen=True, slots=True)

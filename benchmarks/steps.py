@@ -77,7 +77,7 @@ def steps_of_run(scenario: str, folder: Path) -> list[dict[str, Any]]:
     step("imports to run it", lambda: load("ppafo.simulation.simulate"))
     step("run", lambda: sys.modules["ppafo.simulation.simulate"].simulate(state["scenario"]))
     result = state["run"]
-    step("imports to draw", importlib.import_module("ppafo.report.drawing").load_drawing)
+    step("imports to draw", importlib.import_module("ppafo.report.style").load_drawing)
     finding = command.finding_of(command.assessed(result, False))
     step("figure and page", lambda: load("ppafo.report.finding")[0].page_files(finding))
     step("files", lambda: result.save(folder, state[found[-1]["step"]]))

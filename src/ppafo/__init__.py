@@ -67,7 +67,7 @@ _HOMES = {
     "ppafo.storage.reading": ("read_recording",),
     "ppafo.studies.loading": ("list_studies", "load_study"),
     "ppafo.report.finding": ("Finding",),
-    "ppafo.report.stored_figure": ("read_result",),
+    "ppafo.report.recording_figure": ("read_result",),
     "ppafo.walking": ("compare_walks", "list_walks", "load_walk"),
     "ppafo.walking.walk": ("walk",),
 }

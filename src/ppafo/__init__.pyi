@@ -50,7 +50,7 @@ from ppafo.parameters import load_device as load_device
 from ppafo.parameters import load_parameter_set as load_parameter_set
 from ppafo.parameters.device import Device as Device
 from ppafo.report.finding import Finding as Finding
-from ppafo.report.stored_figure import read_result as read_result
+from ppafo.report.recording_figure import read_result as read_result
 from ppafo.running import SteppedRun as SteppedRun
 from ppafo.running import simulate as simulate
 from ppafo.running import simulate_many as simulate_many

@@ -17,7 +17,7 @@ from ppafo.remedy_trials import verdict_of
 from ppafo.simulation import simulate as of_loaded
 from ppafo.simulation.contradictions import check_no_bottle
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.sampled import SampledRun
+from ppafo.simulation.python_controller import SampledRun
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, result_of
 

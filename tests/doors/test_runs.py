@@ -18,8 +18,7 @@ from ppafo.loading import load_scenario
 from ppafo.measuring import evaluate
 from ppafo.model.sensors import Measurement
 from ppafo.running import simulate
-from ppafo.simulation.ensemble import COMPLETED, run_ensemble
-from ppafo.simulation.ensemble.running import offered
+from ppafo.simulation.ensemble import COMPLETED, offered, run_ensemble
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.reading import read_recording
 from tests.doors.of_python import (

@@ -13,7 +13,7 @@ from ppafo.report.panels import Mark, Panel, dots
 from ppafo.report.style import BLACK, BLUE, COLOURS, GREEN, GREY, MARKERS, ORANGE, PURPLE, VERMILION, look_of_valve
 from ppafo.running import simulate
 from ppafo.simulation.declaration import changes_reach
-from ppafo.simulation.ensemble.running import lacking
+from ppafo.simulation.ensemble import lacking
 from ppafo.simulation.gains import gains_of, remark_on_following_gains
 from ppafo.simulation.numbers import NOISE_SEED, changes_in
 from ppafo.simulation.simulate import Result, Status, simulate_many

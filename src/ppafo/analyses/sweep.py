@@ -149,8 +149,8 @@ def sweep_into_folder(
     The command: it writes the folder with figure, page and text. An interrupt is raised again with a message on whether
     the same command resumes the study.
     """
-    from ppafo.report.drawing import load_drawing
     from ppafo.report.finding import page_files, text_of
+    from ppafo.report.style import load_drawing
     from ppafo.study.store import study_folder
 
     # A module imported below may import Matplotlib, slowly: load_drawing imports it first, without its slow parts.

@@ -38,7 +38,7 @@ def export_figure(folder: Folder, *, out: File | None = None, width: FigureWidth
             allowed = ", ".join(f".{name}" for name in FIGURE_FORMATS)
             raise DataError(f"--out {out}: the name must end in one of {allowed}")
         output.check_new_file(out)
-    from ppafo.report.drawing import load_drawing
+    from ppafo.report.style import load_drawing
     from ppafo.storage.owned_folder import entries_of
 
     if not folder.is_dir():
@@ -77,8 +77,7 @@ def _drawn(folder: Path, names: list[str]) -> "dict[str, Figure]":
     """Return the figures of a run, a walk, a study or rig recordings by the stem of their files; else none."""
     from ppafo.analyses.endurance.discharge import WALK_FILE
     from ppafo.analyses.study_results import load_study_results
-    from ppafo.report.recording_figure import recording_figure
-    from ppafo.report.stored_figure import draw_stored_walk, read_result, stated_units
+    from ppafo.report.recording_figure import draw_stored_walk, read_result, recording_figure, stated_units
     from ppafo.rig.experiments import RIG_FILE
     from ppafo.storage.owned_folder import MARK, read_json
     from ppafo.storage.reading import read_recording

@@ -96,7 +96,7 @@ def deliver(answer: Any, as_json: bool, out: Path | None, command: str, *, has_w
         print_result(text, {}, as_json)
     if out is not None:
         _tell_drawing()
-        from ppafo.report.drawing import load_drawing
+        from ppafo.report.style import load_drawing
 
         # Before anything else imports Matplotlib, so that it comes without what it does for others.
         load_drawing()

@@ -127,7 +127,7 @@ def _text(report: _RunReport) -> str:
 def _write(report: _RunReport, folder: Path) -> str:
     """Draw figure and page, write the result folder, and return the last lines of text."""
     # Before anything else imports Matplotlib, so that it comes without what it does for others.
-    from ppafo.report.drawing import load_drawing
+    from ppafo.report.style import load_drawing
 
     load_drawing()
     from ppafo.report.finding import REPORT, page_files

@@ -80,6 +80,10 @@ logger = logging.getLogger("ppafo")
 
 _PARTS_WITH_UNITS = ("initial", "motion", "controller.peak_torque", "reference")
 """Parts of a file whose quantities define the display units of their author, in increasing priority."""
+_NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
+"""Reference of a controller that follows none."""
+_ASSUMED = "assumed"
+"""Section of a file with a note for each assumed path."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,12 +164,6 @@ def _leaves(value: Any) -> list[Any]:
 def device_error(reading: DocumentReader, error: ParameterError) -> ParameterError:
     """Return a ParameterError that names the scenario in which ``error`` was raised, on one line."""
     return ParameterError(f"{reading.file}: [device]: {one_line(error)}")
-
-
-_NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
-"""Reference of a controller that follows none."""
-_ASSUMED = "assumed"
-"""Section of a file with a note for each assumed path."""
 
 
 def build_scenario(reading: DocumentReader) -> Scenario:

@@ -37,6 +37,10 @@ if TYPE_CHECKING:
 
 in_own_units = in_units(lambda result, *_, **__: result.scenario.device.shown)
 """Texts and figures of a result in the display units of its device."""
+REMEDY = (
+    "the time step may be too long for this device, or a value unrealistic: try a smaller run.step, "
+    "and check the inertia, the volumes and the valve area (ppafo sets audit)"
+)
 
 
 class RecordedResult:
@@ -124,12 +128,6 @@ class RecordedResult:
         # pandas keeps no attributes of columns.
         frame.attrs = {**table.attrs, "units": {str(name): table[name].attrs["units"] for name in table.data_vars}}
         return frame
-
-
-REMEDY = (
-    "the time step may be too long for this device, or a value unrealistic: try a smaller run.step, "
-    "and check the inertia, the volumes and the valve area (ppafo sets audit)"
-)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from ppafo.metrics import METRICS
 from ppafo.metrics.metric import MetricKind
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.plugins import nearest_kind
-from ppafo.simulation.ensemble.running import lacking, offered
+from ppafo.simulation.ensemble import lacking, offered
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import parse_quantity
 from ppafo.wording import first_twice

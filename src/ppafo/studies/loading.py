@@ -28,7 +28,7 @@ from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import other_forms, override_set, read_overrides
 from ppafo.parameters.records import checked_record
 from ppafo.plugins import Plugins
-from ppafo.simulation.ensemble.running import lacking
+from ppafo.simulation.ensemble import lacking
 from ppafo.simulation.numbers import changes_in, chosen_path
 from ppafo.studies.declaration import NOT_RANDOM, SAME_AS, ConfigurationSection, Correlation, StudyFile
 from ppafo.studies.draws import MAXIMUM_SOBOL_DIMENSIONS, Factor, Uncertainty, cholesky_factor, uncertainty_of

@@ -14,7 +14,7 @@ from ppafo.model.declaration import Number, Quantity
 from ppafo.parameters.declared import Many, Words
 from ppafo.parameters.parameter_set import PATHS_THAT_SET_UNITS, chosen_units
 from ppafo.parameters.records import keyed
-from ppafo.simulation.ensemble.running import lacking, offered
+from ppafo.simulation.ensemble import lacking, offered
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.studies.distributions import Distribution
 from ppafo.wording import first_twice, known_names

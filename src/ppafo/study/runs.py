@@ -16,9 +16,8 @@ from ppafo.metrics.settled import MOST_REVERSALS
 from ppafo.metrics.tracking import ONE_INSTANT
 from ppafo.progress import Progress, Report
 from ppafo.simulation.clock import TIMES
-from ppafo.simulation.ensemble import COMPLETED, run_ensemble
+from ppafo.simulation.ensemble import COMPLETED, lacking, run_ensemble
 from ppafo.simulation.ensemble.planning import absolute
-from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking import most_reversals

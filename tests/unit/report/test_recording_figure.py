@@ -10,8 +10,7 @@ import pytest
 from ppafo.errors import DataError
 from ppafo.metrics import Metric
 from ppafo.report.kind import metrics_lines
-from ppafo.report.recording_figure import recording_figure
-from ppafo.report.stored_figure import draw_stored_result
+from ppafo.report.recording_figure import draw_stored_result, recording_figure
 from ppafo.report.style import house_style, render_figure
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.storage import StoredResult

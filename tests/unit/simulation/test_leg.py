@@ -15,8 +15,7 @@ from ppafo.gait import load_gait
 from ppafo.metrics import METRICS
 from ppafo.model.gait import shank_in_gait
 from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
-from ppafo.simulation.ensemble import run_ensemble
-from ppafo.simulation.ensemble.running import lacking
+from ppafo.simulation.ensemble import lacking, run_ensemble
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import FreeMotion, Scenario

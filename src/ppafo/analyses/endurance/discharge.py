@@ -31,7 +31,7 @@ from ppafo.parameters.parameter_set import SOURCE
 from ppafo.report.finding import Finding, Section, columns_of, facts
 from ppafo.report.kind import TIME, Kind, duration_kind
 from ppafo.report.panels import Mark, Panel
-from ppafo.report.stored_figure import stated_units, table_at
+from ppafo.report.recording_figure import stated_units, table_at
 from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats

@@ -53,6 +53,11 @@ _SHORT = 0.1
 """Time below which a text has milliseconds [s]."""
 _KEPT_OF_ORIFICE = (".critical_ratio", ".discharge_coefficient")
 """Second number of an orifice, which a remedy leaves unchanged."""
+_FULLY_OPEN = 0.98
+"""Command above which a valve counts as fully open [-]."""
+_FULL_FLOW, _HARDLY = 0.9, 0.05
+"""Share of the flow through an open regulator from which it counts as fully open, and share of the largest such flow up
+to which it gives hardly any [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,13 +220,6 @@ def stiffened(scenario: Scenario, *factors: float) -> list[Change]:
 def dead_band(scenario: Scenario) -> float:
     """Dead band of the valve [-]; 0 for a valve without one."""
     return float(scenario.device.valve.settings.get("dead_band", 0.0))
-
-
-_FULLY_OPEN = 0.98
-"""Command above which a valve counts as fully open [-]."""
-_FULL_FLOW, _HARDLY = 0.9, 0.05
-"""Share of the flow through an open regulator from which it counts as fully open, and share of the largest such flow up
-to which it gives hardly any [-]."""
 
 
 class TrackingCause(NamedTuple):
