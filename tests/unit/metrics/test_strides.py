@@ -47,7 +47,7 @@ def metered(columns: dict[str, np.ndarray], first: int = 0) -> StrideMeter:
 @pytest.mark.parametrize("first", [0, 10])
 def test_sums_over_strides_are_those_of_the_recording(first: int) -> None:
     columns = totals()
-    ended = metered(columns, first).ended
+    ended = metered(columns, first)
     paths = {item.total: item.total.rpartition(".")[2] for item in PER_STRIDE.values()}
     recorded = {path: columns[name][first:] for path, name in paths.items()}
     found = per_stride(recorded, stride_starts(columns["strides"][first:]))
@@ -58,4 +58,4 @@ def test_sums_over_strides_are_those_of_the_recording(first: int) -> None:
 
 def test_a_landing_on_the_toes_is_that_of_the_stride_that_it_begins() -> None:
     # Strides begin at 25, 35, 45 and 55 after the first two; the landing at 65 begins one that does not end.
-    assert metered(totals()).ended.sums.toe_landing == 2.0
+    assert metered(totals()).sums.toe_landing == 2.0
