@@ -106,28 +106,22 @@ def read_rms_error_hold(readings: Readings) -> Floats:
 
 
 _OF_TORQUE = (
-    MetricKind(
-        "rms_error",
-        "N m",
-        f"{_RMS} over the whole run",
-        _NEEDED,
-        rms_error,
-        read_rms_error,
-        (SQUARED_ERROR,),
-        better=-1,
-    ),
     *(
         MetricKind(
-            f"rms_error_{part_of.__name__}",
+            f"rms_error{part}",
             "N m",
-            f"{_RMS} on the {part_of.__name__}",
+            f"{_RMS} {words}",
             _NEEDED,
             partial(rms_error, part_of=part_of),
             read,
             (SQUARED_ERROR,),
             better=-1,
         )
-        for part_of, read in ((ramp, read_rms_error_ramp), (hold, read_rms_error_hold))
+        for part, words, part_of, read in (
+            ("", "over the whole run", None, read_rms_error),
+            ("_ramp", "on the ramp", ramp, read_rms_error_ramp),
+            ("_hold", "on the hold", hold, read_rms_error_hold),
+        )
     ),
     metered(peak_error, "N m", _PEAK, _NEEDED, (SQUARED_ERROR, "largest"), function=root, better=-1),
     metered(final_error, "N m", "absolute torque error at the end", _NEEDED, (SQUARED_ERROR, "last"), function=root),

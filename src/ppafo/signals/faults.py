@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,7 +56,7 @@ class _Plateau:
     first: int
     last: int
     value: float
-    word: Literal["largest", "smallest"]
+    word: str
 
     @property
     def count(self) -> int:
@@ -84,19 +83,13 @@ def lasting_change(values: Floats) -> float:
 
 def plateaus(values: Floats) -> tuple[_Plateau, _Plateau]:
     """Return the longest runs at exactly the largest and exactly the smallest value."""
-    largest, smallest = float(values.max()), float(values.min())
-    return (
-        _Plateau(*longest_run(values == largest), largest, "largest"),
-        _Plateau(*longest_run(values == smallest), smallest, "smallest"),
-    )
-
-
-def longest_run(flags: NDArray[np.bool_]) -> tuple[int, int]:
-    """Return first and last index of the longest run of True flags; at least one flag must be True."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
-    starts, ends = edges[::2], edges[1::2]
-    longest = int(np.argmax(ends - starts))
-    return int(starts[longest]), int(ends[longest] - 1)
+    found = []
+    for value, word in ((values.max(), "largest"), (values.min(), "smallest")):
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], (values == value).astype(np.int8), [0]))))
+        starts, ends = edges[::2], edges[1::2]
+        longest = int(np.argmax(ends - starts))
+        found.append(_Plateau(int(starts[longest]), int(ends[longest] - 1), float(value), word))
+    return found[0], found[1]
 
 
 def is_at_limit(values: Floats, plateau: _Plateau) -> bool:
