@@ -102,12 +102,13 @@ class Validation:
                     "samples": len(agreement.measured),
                     "motion": agreement.request.settings.motion,
                     "step": agreement.replayed.step,
-                    "inputs": list(agreement.replayed.inputs),
+                    "inputs": list(agreement.request.inputs),
                     "delay_is_at_limit": agreement.is_at_limit,
                     "remarks": list(agreement.remarks),
                     "channels": {
                         channel.channel: {
-                            **fields_of(channel, "unit", "rms", "rms_unaligned", "noise", "passes", "full_range"),
+                            "unit": COMPARED[channel.channel].unit,
+                            **fields_of(channel, "rms", "rms_unaligned", "noise", "passes", "full_range"),
                             **fields_of(channel, "variation", "bias", "largest", "largest_time"),
                             "rms_share": channel.fraction,
                             "limit_share": channel.limit,
@@ -347,7 +348,7 @@ def _part(name: str, agreement: RecordingAgreement) -> ask.Section:
     delay = f"{1.0e3 * agreement.delay:.3g} ms" if agreement.delay else "none found"
     replayed = (
         f"{len(measured)} samples over {measured.duration:.4g} s; inputs from the recording: "
-        f"{', '.join(agreement.replayed.inputs)}; delay of the measurement: {delay}"
+        f"{', '.join(agreement.request.inputs)}; delay of the measurement: {delay}"
     )
     across = 1 if len(agreement.channels) == 1 else 2
     return ask.Section(

@@ -62,10 +62,10 @@ _AT_LIMIT = 0.99
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChannelAgreement:
-    """Errors of the model in one channel, in its SI unit ``unit``.
+    """Errors of the model in one channel, in the SI unit of ``COMPARED``.
 
     ``values``: samples; ``model``: replay at their times, later by the common delay; ``residuals``: measured - model
-    ``full_range``, ``usual_zero``: full range of the channel, and usual zero error of a sensor
+    ``full_range``: full range of the channel
     ``noise``: standard deviation of the measurement noise, white or correlated
     ``variation``: standard deviation of the signal without noise, which no model explains
     ``rms``, ``rms_unaligned``: root mean square of the residuals, and without correction of the delay
@@ -74,12 +74,10 @@ class ChannelAgreement:
     """
 
     channel: str
-    unit: str
     values: Floats = field(repr=False)
     model: Floats = field(repr=False)
     residuals: Floats = field(repr=False)
     full_range: float
-    usual_zero: float
     noise: float
     variation: float
     rms: float
@@ -110,16 +108,16 @@ class RecordingAgreement:
     """Recording, model replayed on the recorded inputs, and errors of each channel.
 
     ``request``: recording, device, start and settings of the replay
-    ``replayed``: model on the clock of the recording, with its time step and inputs
+    ``replayed``: model on the clock of the recording, with its time step
     ``lag``: common delay of the measurement behind the model [s], below 0 if it leads, 0 if undetectable
-    ``is_at_limit``: True if the lag is at the limit of its search
+    ``delay``: delay that was removed [s]; 0 at the limit and for a lead, where the best fit is no sensor's delay
     ``remarks``: sentences for the report
     """
 
     request: Replay
     replayed: Replayed
     lag: float
-    is_at_limit: bool
+    delay: float
     channels: tuple[ChannelAgreement, ...]
     remarks: tuple[str, ...]
 
@@ -139,9 +137,9 @@ class RecordingAgreement:
         return self.replayed.recording
 
     @property
-    def delay(self) -> float:
-        """Common delay that was removed [s]; 0 at the limit and for a lead, where the best fit is no sensor's delay."""
-        return 0.0 if self.is_at_limit else max(self.lag, 0.0)
+    def is_at_limit(self) -> bool:
+        """True if the lag is at the limit of its search."""
+        return abs(self.lag) > _AT_LIMIT * self.request.settings.longest_delay
 
     @property
     def passes(self) -> bool:
@@ -176,77 +174,92 @@ def compare_recording(measured: MeasuredRecording, device: Device, settings: Rep
     return agreement_of(request, replayed)
 
 
-def agreement_of(request: Replay, replayed: Replayed, known_delay: float | None = None) -> RecordingAgreement:
+@in_units(lambda request, *_: request.device.shown)
+def agreement_of(request: Replay, replayed: Replayed, known_delay: float = 0.0) -> RecordingAgreement:
     """Return the comparison of a recording with its replay; a ``known_delay`` [s] takes the place of the estimate.
 
     Raises DataError if no channel can be compared.
     """
     measured, device, settings, model = request.measured, request.device, request.settings, replayed.recording
-    recorded, longest = measured.recording, settings.longest_delay
+    recorded, longest, supply = measured.recording, settings.longest_delay, device.supply
     read = {name: recorded[name] for name in recorded.names}
     if PRESSURE_1 in recorded and PRESSURE_2 in recorded:
         read[PRESSURE_DIFFERENCE] = recorded[PRESSURE_1] - recorded[PRESSURE_2]
     # Where the vane is locked, or where there is none, some channels carry no information.
     of_volume, is_locked = settings.volume is not None, settings.motion == "locked"
     informative = [PRESSURE_1] if of_volume else [name for name in COMPARED if not is_locked or name != ANGLE]
-    samples = {name: read[name] for name in informative if name in read and name not in replayed.inputs}
+    samples = {name: read[name] for name in informative if name in read and name not in request.inputs}
     if not samples:
         needed = "pressure_1" if of_volume else "a channel other than the prescribed angle"
         raise DataError(f"{measured.file}: no channel can be compared; the recording needs {needed}")
-    gauge = supply_gauge(recorded, device)
-    full_ranges = {name: full_range(name, device, gauge) for name in samples}
+    gauge, gauge_of_set = supply_gauge(recorded, device), supply.pressure - supply.atmospheric_pressure
+    remarks = list(measured.remarks)
+    if SUPPLY in recorded and abs(gauge - gauge_of_set) > _OTHER_SUPPLY * gauge_of_set:
+        times = f"{gauge / gauge_of_set:.3g} times the gauge pressure of" if gauge_of_set > 0.0 else "not"
+        remarks.append(f"the recorded supply pressure is {times} supply.pressure; the recorded values were used")
+    if SUPPLY not in recorded:
+        # Shown as values, for they may be the set's or given in its place.
+        used = {"supply.pressure": supply.pressure}
+        if not (of_volume or DORSIFLEXION_SUPPLY in recorded or supply.has_one_pressure):
+            used["supply.dorsiflexion_pressure"] = supply.dorsiflexion_pressure
+        atmosphere = supply.atmospheric_pressure
+        shown = [f"{path} = {shown_text(value, 'Pa_a', '.4g', atmosphere)}" for path, value in used.items()]
+        verb = "was" if len(shown) == 1 else "were"
+        remarks.append(f"the supply pressure was not recorded; {' and '.join(shown)} {verb} used")
+    if regular_interval(recorded.time) is None:
+        remarks.append("samples are not equally spaced in time; changes of the command were moved to the nearest step")
+    spans = {name: full_range(name, device, gauge) for name in samples}
     # Sums and multiples of two others do not count twice.
     sensed = [name for name in (ANGLE, PRESSURE_1, PRESSURE_2) if name in samples] or list(samples)[:1]
-    lag, is_at_limit = known_delay or 0.0, False
-    if known_delay is None and longest > 0.0:
-        curves = [(samples[name], model[name], full_ranges[name]) for name in sensed]
-        lag, is_at_limit = _estimated_delay(recorded.time, model.time, curves, longest)
-    remarks = [*measured.remarks, *_remarks(measured, device, settings)]
-    if is_at_limit:
-        remarks.append(f"model and measurement differ in time by more than {longest:g} s; no delay was removed")
-    elif lag < 0.0:
-        remarks.append(
-            f"the recorded signals lead the model by {1.0e3 * -lag:.3g} ms; sensors lag, so this was not removed"
-        )
-    agreement = RecordingAgreement(request, replayed, lag, is_at_limit, channels=(), remarks=tuple(remarks))
-    channels = [_channel(agreement, name, values, full_ranges[name]) for name, values in samples.items()]
-    return replace(agreement, channels=tuple(channels))
+    lag, delay = 0.0, known_delay
+    if not known_delay and longest > 0.0:
+        curves = [(samples[name], model[name], spans[name]) for name in sensed]
+        lag = _estimated_lag(recorded.time, model.time, curves, longest)
+        delay = max(lag, 0.0) if abs(lag) <= _AT_LIMIT * longest else 0.0
+        if abs(lag) > _AT_LIMIT * longest:
+            remarks.append(f"model and measurement differ in time by more than {longest:g} s; no delay was removed")
+        elif lag < 0.0:
+            remarks.append(
+                f"the recorded signals lead the model by {1.0e3 * -lag:.3g} ms; sensors lag, so this was not removed"
+            )
+    channels = tuple(_channel(request, model, delay, name, values, spans[name]) for name, values in samples.items())
+    return RecordingAgreement(request, replayed, lag, delay, channels, tuple(remarks))
 
 
-def _channel(agreement: RecordingAgreement, name: str, values: Floats, span: float) -> ChannelAgreement:
-    """Return the errors of the model in a channel of a full range ``span`` [SI], with the recorded ``values``.
+def _channel(
+    request: Replay, replay: Recording, delay: float, name: str, values: Floats, span: float
+) -> ChannelAgreement:
+    """Return the errors of a ``replay`` in a channel of a full range ``span`` [SI], with the recorded ``values``.
 
     Unless the user sets a limit, it is 3 % of full range or half of the signal variance, whichever is less, combined
     with the noise and with the usual zero error of sensors (the only visible error of a constant signal).
     """
-    times, replay, request = agreement.measured.time, agreement.model, agreement.request
+    times = request.measured.recording.time
     intervals = np.diff(times)
     # Each sample speaks for its time, by the trapezoidal rule, and none for a gap.
     intervals = np.minimum(intervals, _LONGEST_WEIGHT * np.median(intervals))
     weights = 0.5 * (np.append(intervals, 0.0) + np.insert(intervals, 0, 0.0))
     weights = weights / weights.sum()
-    model, unaligned = (np.interp(times - delay, replay.time, replay[name]) for delay in (agreement.delay, 0.0))
+    model, unaligned = (np.interp(times - late, replay.time, replay[name]) for late in (delay, 0.0))
     residuals = values - model
     noise = max(noise_in(values, span), correlated_noise_of(residuals))
     deviation = values - weights @ values
     variation = math.sqrt(max(float(weights @ deviation**2) - noise * noise, 0.0))
     worst = int(np.argmax(np.abs(residuals)))
-    zero_error, thresholds = usual_zero(name, request.device), request.settings.thresholds
+    thresholds = request.settings.thresholds
     if (allowed := thresholds.get(name, thresholds.get(""))) is not None:
         limit = allowed.value if allowed.is_fraction else allowed.value / span
     else:
         explained = min(ACCEPTABLE_FRACTION * span, math.sqrt(1.0 - EXPLAINED_FRACTION) * variation)
         # Of a low supply the usual zero is much of the range: there the limit stays a fraction of it.
-        zero = min(max(zero_error, _UNMOVED * span), ACCEPTABLE_FRACTION * span)
+        zero = min(max(usual_zero(name, request.device), _UNMOVED * span), ACCEPTABLE_FRACTION * span)
         limit = math.hypot(explained, zero, _WITHIN_NOISE * noise) / span
     return ChannelAgreement(
         channel=name,
-        unit=COMPARED[name].unit,
         values=values,
         model=model,
         residuals=residuals,
         full_range=span,
-        usual_zero=zero_error,
         noise=noise,
         variation=variation,
         rms=float(np.sqrt(weights @ residuals**2)),
@@ -258,10 +271,10 @@ def _channel(agreement: RecordingAgreement, name: str, values: Floats, span: flo
     )
 
 
-def _estimated_delay(
+def _estimated_lag(
     times: Floats, model_times: Floats, curves: Sequence[tuple[Floats, Floats, float]], limit: float
-) -> tuple[float, bool]:
-    """Return the delay within +-``limit`` [s] with the least mean squared error, and True if it is at the limit.
+) -> float:
+    """Return the lag within +-``limit`` [s] with the least mean squared error, 0 if none is seen.
 
     ``curves`` are samples at ``times``, model at ``model_times`` and full range of each channel.
     """
@@ -284,32 +297,5 @@ def _estimated_delay(
     least = cost(value)
     gain, samples = cost(0.0) - least, len(curves) * times[thinned].size
     is_significant = gain > _SMALLEST_GAIN and gain * samples > _MINIMUM_GAIN * least
-    if abs(value) < _RESOLUTION * float(np.median(np.diff(times[thinned]))) or not is_significant:
-        return 0.0, False
-    return value, abs(value) > _AT_LIMIT * limit
-
-
-@in_units(lambda _, device, *__: device.shown)
-def _remarks(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> tuple[str, ...]:
-    """Return remarks on assumptions that differ from set or recording: supply pressure, sample times."""
-    remarks = []
-    gauge_of_set = device.supply.pressure - device.supply.atmospheric_pressure
-    recorded_gauge = supply_gauge(measured.recording, device)
-    if SUPPLY in measured.recording and abs(recorded_gauge - gauge_of_set) > _OTHER_SUPPLY * gauge_of_set:
-        relation = "not"
-        if gauge_of_set > 0.0:
-            relation = f"{recorded_gauge / gauge_of_set:.3g} times the gauge pressure of"
-        remarks.append(f"the recorded supply pressure is {relation} supply.pressure; the recorded values were used")
-    if SUPPLY not in measured.recording:
-        # Shown as values, for they may be the set's or given in its place.
-        used = {"supply.pressure": device.supply.pressure}
-        has_second = DORSIFLEXION_SUPPLY in measured.recording or device.supply.has_one_pressure
-        if settings.volume is None and not has_second:
-            used["supply.dorsiflexion_pressure"] = device.supply.dorsiflexion_pressure
-        atmosphere = device.supply.atmospheric_pressure
-        shown = [f"{path} = {shown_text(value, 'Pa_a', '.4g', atmosphere)}" for path, value in used.items()]
-        verb = "was" if len(shown) == 1 else "were"
-        remarks.append(f"the supply pressure was not recorded; {' and '.join(shown)} {verb} used")
-    if regular_interval(measured.recording.time) is None:
-        remarks.append("samples are not equally spaced in time; changes of the command were moved to the nearest step")
-    return tuple(remarks)
+    is_seen = abs(value) >= _RESOLUTION * float(np.median(np.diff(times[thinned])))
+    return value if is_significant and is_seen else 0.0

@@ -69,19 +69,19 @@ def read_measured(
     a model.
     """
     atmosphere = device.supply.atmospheric_pressure
-    column_map, map_name = (None, "") if columns is None else column_map_of(columns)
     if not isinstance(source, str | Path):
-        given = source if isinstance(source, Recording) else read_recording(source, atmosphere=atmosphere)
-        values = np.concatenate([given.time, *(given[name] for name in sorted(given.names))])
-        return check_recording(given, device, given.label, hashlib.sha256(values.tobytes()).hexdigest())
-    place = Path(source)
-    if column_map is None or place.is_dir():
-        recording = read_recording(place, atmosphere=atmosphere)
+        recording = source if isinstance(source, Recording) else read_recording(source, atmosphere=atmosphere)
+        file = recording.label
+        content = np.concatenate([recording.time, *(recording[name] for name in sorted(recording.names))]).tobytes()
     else:
-        gas = f"{device.gas.molar_mass!r} kg/mol"
-        recording = read_foreign(place, column_map, atmosphere=atmosphere, map_name=map_name, gas=gas)
-    content = read_bytes(place / NETCDF_FILE if place.is_dir() else place)
-    return check_recording(recording, device, str(source), hashlib.sha256(content).hexdigest())
+        file, place = str(source), Path(source)
+        if columns is None or place.is_dir():
+            recording = read_recording(place, atmosphere=atmosphere)
+        else:
+            (column_map, map_name), gas = column_map_of(columns), f"{device.gas.molar_mass!r} kg/mol"
+            recording = read_foreign(place, column_map, atmosphere=atmosphere, map_name=map_name, gas=gas)
+        content = read_bytes(place / NETCDF_FILE if place.is_dir() else place)
+    return check_recording(recording, device, file, hashlib.sha256(content).hexdigest())
 
 
 @in_units(lambda _recording, device, *_: device.shown)
@@ -105,17 +105,15 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     check_gaps(recording, file)
     check_command(recording, file)
     # Values out of reach of the device are a damaged line, or a unit wrong by powers of ten.
-    supply = device.supply
+    supply, supplies = device.supply, (SUPPLY, DORSIFLEXION_SUPPLY)
     highest = max(supply.pressure, supply.dorsiflexion_pressure)
-    supplies = (SUPPLY, DORSIFLEXION_SUPPLY)
     for name in (name for name in (*supplies, *COMPARED) if name in recording):
-        most = highest if name in supplies else full_range(name, device, highest)
-        worst = int(np.argmax(np.abs(recording[name])))
-        if abs(recording[name][worst]) > _MAXIMUM_RANGES * most:
-            where = f"{recording.time[worst]:.6g} s (sample {worst + 1})"
+        most, values = highest if name in supplies else full_range(name, device, highest), recording[name]
+        worst = int(np.argmax(np.abs(values)))
+        if abs(values[worst]) > _MAXIMUM_RANGES * most:
             raise DataError(
-                f"{file}: '{name}' is {shown_text(recording[name][worst], recording.unit(name))} at {where}, more than "
-                f"{_MAXIMUM_RANGES:g} times what {device.name} can reach"
+                f"{file}: '{name}' is {shown_text(values[worst], recording.unit(name))} at {recording.time[worst]:.6g} "
+                f"s (sample {worst + 1}), more than {_MAXIMUM_RANGES:g} times what {device.name} can reach"
             )
     check_absolute(recording, supply.atmospheric_pressure, file)
     owner = f"the recorded '{SUPPLY}'" if SUPPLY in recording else f"the supply of {device.name}"

@@ -1,7 +1,7 @@
 """Replay: the model driven by recorded inputs (command, supply, external torque or angle) from the first state."""
 
 import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +21,7 @@ from ppafo.simulation.recorded.replay import replay_scenario
 from ppafo.simulation.recorded.rest import ReplayStart
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario, locked_vane, vane_motion
 from ppafo.validation.measured import MeasuredRecording
-from ppafo.validation.settings import ANGLE, Motion, ReplaySettings
+from ppafo.validation.settings import ANGLE, ReplaySettings
 
 MAXIMUM_STEPS = 20_000_000
 """Largest number of steps of a replay; more indicates a wrong time unit."""
@@ -33,11 +33,10 @@ _ROUNDING = 1.0e-9
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """Replayed recording on the clock of the measurement, engine time step [s], and names of the inputs."""
+    """Replayed recording on the clock of the measurement, and engine time step [s]."""
 
     recording: Recording
     step: float
-    inputs: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +47,14 @@ class Replay:
     device: Device
     start: ReplayStart
     settings: ReplaySettings
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Recorded channels used as inputs; external torque is an input of a free vane only."""
+        motion, recording = self.settings.motion, self.measured.recording
+        names = (SUPPLY, DORSIFLEXION_SUPPLY, *([EXTERNAL_TORQUE] if motion == "free" else []))
+        angle = (ANGLE,) if motion == "measured" else ()
+        return (COMMAND, *(name for name in names if name in recording), *angle)
 
 
 def replay_together(requests: Sequence[Replay]) -> list[Replayed | PpafoError]:
@@ -60,9 +67,9 @@ def replay_together(requests: Sequence[Replay]) -> list[Replayed | PpafoError]:
     for number, request in enumerate(requests):
         try:
             recording = request.measured.recording
-            followed = followed_channels(recording, request.settings.motion)
             run = _plan(request)
-            inputs = step_inputs(RecordedInputs(recording, followed, float(recording.time[0])), request.device, run)
+            recorded = RecordedInputs(recording, request.inputs, float(recording.time[0]))
+            inputs = step_inputs(recorded, request.device, run)
             batch = batch_of(run)
         except PpafoError as error:
             ended[number] = error
@@ -78,18 +85,15 @@ def replay_together(requests: Sequence[Replay]) -> list[Replayed | PpafoError]:
             parameters=np.concatenate([batch.parameters for batch in batches], axis=1),
             states=np.concatenate([batch.states for batch in batches], axis=1),
         )
-        result, rows = replay(joint, followed_inputs[0]), state_row_numbers(runs[0])
+        result = replay(joint, followed_inputs[0])
         for lane, (number, run) in enumerate(zip(numbers, runs, strict=True)):
-            record, ends = result.record[:, :, lane], result.states[:, lane]
-            ended[number] = _replayed(requests[number], run, rows, record, ends)
+            ended[number] = _replayed(requests[number], run, result.record[:, :, lane], result.states[:, lane])
     return [ended[number] for number in range(len(requests))]
 
 
-def _replayed(
-    request: Replay, run: Run, rows: Mapping[str, int], record: Floats, ends: Floats
-) -> Replayed | SimulationError:
+def _replayed(request: Replay, run: Run, record: Floats, ends: Floats) -> Replayed | SimulationError:
     """Return a replay from its record (records, rows) and final state (rows,), or SimulationError if it diverged."""
-    recorded = request.measured.recording
+    recorded, rows = request.measured.recording, state_row_numbers(run)
     failure_time = float(ends[rows["result.failure_time"]])
     if failure_time < NEVER_FAILED or not np.isfinite(record).all():
         until = min(failure_time, run.step * run.step_count)
@@ -100,26 +104,17 @@ def _replayed(
     )
     pressure_1, pressure_2 = pressures_of(run.program.actuator, run.plant, angle, mass_1, mass_2)
     channels = {
-        "angle": (angle, "rad"),
-        "pressure_1": (pressure_1, "Pa"),
-        "pressure_2": (pressure_2, "Pa"),
-        "pressure_difference": (np.subtract(pressure_1, pressure_2), "Pa_d"),
-        "torque": (torque_of(run.program.actuator, run.plant, angle, pressure_1, pressure_2), "N m"),
-        "command": (command, "-"),
+        "angle": Channel(angle, "rad"),
+        "pressure_1": Channel(pressure_1, "Pa"),
+        "pressure_2": Channel(pressure_2, "Pa"),
+        "pressure_difference": Channel(np.subtract(pressure_1, pressure_2), "Pa_d"),
+        "torque": Channel(np.asarray(torque_of(run.program.actuator, run.plant, angle, pressure_1, pressure_2)), "N m"),
+        "command": Channel(command, "-"),
     }
     # Times are on the clock of the recording.
     interval = run.step * run.record_every
     times = recorded.time[0] + interval * np.arange(record.shape[0], dtype=np.float64)
-    values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
-    model = Recording(f"{recorded.label}, replayed", times, values, kind="simulated")
-    return Replayed(model, run.step, followed_channels(recorded, request.settings.motion))
-
-
-def followed_channels(recording: Recording, motion: Motion) -> tuple[str, ...]:
-    """Return the recorded channels used as inputs; external torque is an input of a free vane only."""
-    names = (SUPPLY, DORSIFLEXION_SUPPLY, *([EXTERNAL_TORQUE] if motion == "free" else []))
-    angle = (ANGLE,) if motion == "measured" else ()
-    return (COMMAND, *(name for name in names if name in recording), *angle)
+    return Replayed(Recording(f"{recorded.label}, replayed", times, channels, kind="simulated"), run.step)
 
 
 def replayed_scenario(request: Replay) -> Scenario:
@@ -133,8 +128,7 @@ def replayed_scenario(request: Replay) -> Scenario:
         motion = locked_vane(start.angle)
     elif settings.motion == "leg":
         # The leg on the test fixture is the scenario's of figure 7.
-        leg = settings.leg or vane_motion(load_scenario("step-response")).leg
-        motion = FreeMotion(start.angle, start.angular_velocity, leg=leg)
+        motion = FreeMotion(start.angle, start.angular_velocity, leg=vane_motion(load_scenario("step-response")).leg)
     highest = with_highest_supply(request.device, recording, recording.names)
     duration = recording.duration + max(settings.longest_delay, sample_period(recording.time))
     return replay_scenario(recording, highest, start, duration, request.measured.file, motion)

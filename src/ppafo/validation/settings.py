@@ -1,13 +1,12 @@
 """Settings of a validation in SI units: compared channels, motion, initial values, delay limit and error limits."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.parameters.device import Device
 from ppafo.simulation.recorded.usual_errors import ANGLE_ERRORS, PRESSURE_ERRORS
-from ppafo.simulation.scenario import Leg
 from ppafo.units import parse_quantity, split_quantity
 from ppafo.wording import known_names, one_line
 
@@ -70,21 +69,34 @@ class ErrorLimit:
     is_fraction: bool
 
 
+def _by_channel(noun: str, texts: Iterable[str], known: Collection[str]) -> dict[str, tuple[str, str]]:
+    """Return texts ``CHANNEL=VALUE`` by channel, "" for a value alone: each as a refusal quotes it, and its value.
+
+    Raises DataError for a channel that is not ``known``, or given twice.
+    """
+    read: dict[str, tuple[str, str]] = {}
+    for text in texts:
+        channel, equals, value = (part.strip() for part in text.rpartition("="))
+        quoted = f"{noun} '{one_line(text)}'"
+        if equals and channel not in known:
+            raise DataError(f"{quoted}: there is no channel '{one_line(channel)}'{known_names(channel, known)}")
+        if channel in read:
+            raise DataError(f"{read[channel][0]} and '{one_line(text)}' set the same value; remove one of them")
+        read[channel] = quoted, value
+    return read
+
+
 def parse_thresholds(texts: Iterable[str] = ()) -> dict[str, ErrorLimit]:
     """Parse thresholds such as ``angle=10%``, ``pressure_1=3.7 psi_d`` or ``5%`` to limits by channel, "" for others.
 
-    Later texts override. Raises DataError for a channel that is not compared, or a limit that is not above 0.
+    Raises DataError for a channel that is not compared or given twice, or a limit that is not above 0.
     """
-    limits: dict[str, ErrorLimit] = {}
-    for text in texts:
-        channel, separator, value = (part.strip() for part in text.rpartition("="))
-        where = f"threshold '{one_line(text)}'"
-        if separator and channel not in COMPARED:
-            raise DataError(f"{where}: there is no channel '{one_line(channel)}'{known_names(channel, COMPARED)}")
+    limits = {}
+    for channel, (where, value) in _by_channel("threshold", texts, COMPARED).items():
         with refused_as(DataError, where, UnitError):
             is_fraction = split_quantity(value)[1] in _FRACTION_UNITS
-            number = parse_quantity(value, COMPARED[channel].unit if separator and not is_fraction else "")
-        if not separator and not is_fraction:
+            number = parse_quantity(value, COMPARED[channel].unit if channel and not is_fraction else "")
+        if not channel and not is_fraction:
             raise DataError(f"{where}: a limit for all channels must be in %")
         if number <= 0.0:
             raise DataError(f"{where}: must be above 0")
@@ -104,10 +116,9 @@ class ReplaySettings:
     """Settings of the replay and of the acceptance limits.
 
     ``motion`` is ``free`` for a vane that moves as the model demands, ``measured`` for the recorded angle as prescribed
-    motion, ``locked`` for a vane fixed at its initial angle, or ``leg`` for a vane with the foot of ``leg`` (default:
-    the fixture of figure 7). With a ``volume`` [m^3] chamber 1 is a fixed volume that the valve fills and vents,
-    without a vane. ``initial`` values [SI] by channel override the first samples. ``longest_delay`` [s] limits the
-    estimated delay.
+    motion, ``locked`` for a vane fixed at its initial angle, or ``leg`` for a vane with the foot of figure 7. With a
+    ``volume`` [m^3] chamber 1 is a fixed volume that the valve fills and vents, without a vane. ``initial`` values [SI]
+    by channel override the first samples. ``longest_delay`` [s] limits the estimated delay.
     """
 
     motion: Motion = "free"
@@ -115,23 +126,18 @@ class ReplaySettings:
     longest_delay: float = DEFAULT_LIMIT
     thresholds: Mapping[str, ErrorLimit] = field(default_factory=dict)
     volume: float | None = None
-    leg: Leg | None = None
 
 
-def parse_initial(texts: Sequence[str], atmosphere: float) -> dict[str, float]:
+def parse_initial(texts: Iterable[str], atmosphere: float) -> dict[str, float]:
     """Parse initial values [SI] by channel, from texts such as ``pressure_1=0 psi_g``.
 
-    Gauge pressures are relative to ``atmosphere`` [Pa absolute]. Raises DataError for an unknown channel, unit or form.
+    Gauge pressures are relative to ``atmosphere`` [Pa absolute]. Raises DataError for an unknown or repeated channel,
+    another unit or form.
     """
     values = {}
-    for text in texts:
-        name, equals, value = (part.strip() for part in text.partition("="))
-        if not equals:
-            raise DataError(f"initial value '{one_line(text)}' is not of the form CHANNEL=VALUE")
-        if name not in _UNITS:
-            raise DataError(
-                f"initial value '{one_line(text)}': there is no channel '{one_line(name)}'{known_names(name, _UNITS)}"
-            )
-        with refused_as(DataError, f"initial value '{one_line(text)}'", UnitError):
+    for name, (where, value) in _by_channel("initial value", texts, _UNITS).items():
+        if not name:
+            raise DataError(f"{where} is not of the form CHANNEL=VALUE")
+        with refused_as(DataError, where, UnitError):
             values[name] = parse_quantity(value, _UNITS[name], atmosphere)
     return values

@@ -82,7 +82,7 @@ def test_a_varying_supply_and_a_led_vane_are_followed_as_an_independent_solver_h
         pressures, np.array([supply(time) for time in TIMES]), np.array([angle(time) for time in TIMES])
     )
     agreement = agree(recording, device, motion="measured")
-    assert agreement.replayed.inputs == ("command", "supply_pressure", "angle")
+    assert agreement.request.inputs == ("command", "supply_pressure", "angle")
     assert {channel.channel for channel in agreement.channels} == {"pressure_1", "pressure_2", "pressure_difference"}
     assert max(channel.fraction for channel in agreement.channels) < 3e-4
     constant = recording.with_channel("supply_pressure", np.full(TIMES.size, 4.5e5), "Pa")
@@ -153,7 +153,7 @@ def test_a_recorded_external_torque_moves_the_vane(agree: Agree) -> None:
     assert np.ptp(agree(still, device, initial={"pressure_1": 1.5e5}).model["angle"]) == 0.0
     push = still.with_channel("external_torque", np.where(TIMES > 0.5, 3.0, 0.0), "N m")
     agreement = agree(push, device, initial={"pressure_1": 1.5e5})
-    assert "external_torque" in agreement.replayed.inputs
+    assert "external_torque" in agreement.request.inputs
     assert agreement.model["angle"][-1] < 1.2
 
 
@@ -172,6 +172,6 @@ def test_a_recorded_supply_of_chamber_2_is_followed_by_itself(step: tuple[Device
         # Towards dorsiflexion, chamber 2 is fed: it ends at its supply.
         turned = given.with_channel("command", -np.abs(recording["command"]), "-")
         followed[name] = agree(turned, device)
-    assert all("dorsiflexion_pressure" in agreement.replayed.inputs for agreement in followed.values())
+    assert all("dorsiflexion_pressure" in agreement.request.inputs for agreement in followed.values())
     ends = [followed[name].model["pressure_2"][-1] for name in ("own", "higher")]
     assert ends[1] - ends[0] == pytest.approx(1.0e5, rel=0.05)
