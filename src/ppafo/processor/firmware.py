@@ -4,15 +4,14 @@ The law is translated after a proof that no value exceeds its integer width.
 """
 
 import re
-from collections.abc import Iterator
 from typing import Any, get_type_hints
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.engine.rows import is_number, is_row, leaf_paths, members, rebuilt
+from ppafo.engine.rows import is_row, rebuilt
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.exports import filled, in_markdown, template
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Quantity, quantities_of
 from ppafo.parameters.plant import plant_parameters
 from ppafo.processor.controller import TICK, FixedPointController, fixed_point_controller
 from ppafo.processor.fixed_point import COMMAND_STEPS, LARGEST_READING, SETTINGS, ConverterCounts
@@ -100,11 +99,9 @@ def proof(law: FixedLaw) -> Narrowed:
     state = type(law.begins)
     parameters = tuple(_typed_row(row, collector) for row in (law.numbers, state, ConverterCounts))
     module = walk_module(collector.text(), {entry: parameters})
-    declared = (IntegerRange(int(quantity.minimum), int(quantity.maximum)) for quantity in law.number_quantities)
-    own_names = (path.rpartition(".")[2] for path in leaf_paths(state, ""))
     ranges: dict[str, Range] = {
-        "numbers": _nested(law.numbers, declared),
-        "state": _nested(state, (IntegerRange(*law.state_ranges[name]) for name in own_names)),
+        "numbers": declared(law.numbers),
+        "state": declared(state),
         "readings": (IntegerRange(0, LARGEST_READING),) * len(ConverterCounts._fields),
     }
     proved = narrowed(module, ranges)
@@ -118,9 +115,13 @@ def proof(law: FixedLaw) -> Narrowed:
     return proved
 
 
-def _nested(row: type, ranges: Iterator[IntegerRange]) -> Range:
-    """Arrange ranges of numbers in the nested form of a NamedTuple."""
-    return tuple(next(ranges) if is_number(kind) else _nested(kind, ranges) for _, kind in members(row))
+def declared(row: type) -> Range:
+    """Return the declared ranges of the numbers of a NamedTuple, nested as it is."""
+    quantities = quantities_of(row)
+    ranges: Range = rebuilt(
+        row, (IntegerRange(int(quantity.minimum), int(quantity.maximum)) for quantity in quantities)
+    )
+    return ranges
 
 
 def _typed_row(kind: Any, collector: SourceCollector) -> Row:

@@ -4,10 +4,10 @@ A gain is a 15-bit fraction and a right shift: ``(value * fraction >> 15) >> pla
 """
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from ppafo.control.torque_loop import SHARPNESS
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number, Quantity
 from ppafo.model.sensors import Measurement
 
 FRACTION_BITS = 15
@@ -93,18 +93,24 @@ SETTINGS = (
 """Converter settings of an integer controller."""
 
 
+Flag = Annotated[int, Number("", "1 for true, 0 for false", None, 0.0, 1.0)]
+"""Truth value of a law."""
+
+
 class ConverterLimits(NamedTuple):
     """Largest converter reading, and mid-range reading of a reference of 0 N m [counts]."""
 
-    top: int
-    middle: int
+    top: Annotated[int, Number("", "largest reading of the converter", None, 0.0, float(LARGEST_READING))]
+    middle: Annotated[
+        int, Number("", "reading that stands for a reference of 0 N m", None, 0.0, float(2 ** (MOST_BITS - 1)))
+    ]
 
 
 class CountResolution(NamedTuple):
     """Pressure [Pa] and torque [N m] per converter count."""
 
-    pressure_step: float
-    torque_step: float
+    pressure_step: Annotated[float, Number("Pa_d", "pressure of one count", None, 0.0)]
+    torque_step: Annotated[float, Number("N m", "torque of one count", None, 0.0)]
 
 
 class ConverterCounts(NamedTuple):
@@ -113,17 +119,6 @@ class ConverterCounts(NamedTuple):
     reference: int
     pressure_1: int
     pressure_2: int
-
-
-OF_STEPS = (
-    Quantity("pressure_step", "Pa_d", "pressure of one count", None, 0.0),
-    Quantity("torque_step", "N m", "torque of one count", None, 0.0),
-)
-OF_LIMITS = (
-    Quantity("top", "", "largest reading of the converter", None, 0.0, float(LARGEST_READING)),
-    Quantity("middle", "", "reading that stands for a reference of 0 N m", None, 0.0, float(2 ** (MOST_BITS - 1))),
-)
-"""Declared fields of ``CountResolution`` and ``ConverterLimits``, in order."""
 
 
 def converter_of(

@@ -72,9 +72,11 @@ def try_firmware(scenario: Scenario, samples: int, seed: int = 1) -> FirmwareTri
     if differing:
         first = f"sample {differing[0]}: {found[differing[0]]} on the processor, {expected[differing[0]]} in Python"
     _, flash = re.findall(r"Done, (\d+) bytes total", printed)
-    return FirmwareTrial(
-        samples, len(differing), first, int(flash), _used_memory(printed), max(cycles), sum(cycles) / samples
-    )
+    # What data below and stack above have overwritten, from mspdebug's dump.
+    dump = printed.rpartition(f"=> md {_RAM_START} {RAM}")[2]
+    memory = bytes.fromhex("".join(re.findall(r"^ +[0-9a-f]{5}: ((?:[0-9a-f]{2} )+)", dump, re.MULTILINE)))
+    ram = RAM - max(map(len, re.findall(rb"%c+" % _UNTOUCHED, memory)), default=0)
+    return FirmwareTrial(samples, len(differing), first, int(flash), ram, max(cycles), sum(cycles) / samples)
 
 
 def drawn_readings(top: int, samples: int, seed: int) -> Iterator[ConverterCounts]:
@@ -147,10 +149,3 @@ def _decisions(printed: str) -> tuple[list[tuple[int, int]], list[int]]:
             cycles.append(int(total) - before)
         before = int(total)
     return found, cycles
-
-
-def _used_memory(printed: str) -> int:
-    """Return the RAM [bytes] that data below and stack above have overwritten, from mspdebug's dump of it."""
-    dump = printed.rpartition(f"=> md {_RAM_START} {RAM}")[2]
-    memory = bytes.fromhex("".join(re.findall(r"^ +[0-9a-f]{5}: ((?:[0-9a-f]{2} )+)", dump, re.MULTILINE)))
-    return RAM - max(map(len, re.findall(rb"%c+" % _UNTOUCHED, memory)), default=0)

@@ -2,14 +2,14 @@
 
 import shutil
 import subprocess
-from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from ppafo.errors import ProgramError, ScenarioError, SimulationError
 from ppafo.processor.controller import FIXED_LAWS, PythonProcessor, fixed_point_controller
-from ppafo.processor.firmware import firmware, proof
+from ppafo.processor.firmware import declared, firmware, proof
 from ppafo.processor.simulated import (
     CLOCK,
     FLASH,
@@ -62,17 +62,23 @@ def test_no_number_of_a_law_can_overflow_and_no_state_leaves_its_range(law: Fixe
     assert after
 
 
-@pytest.mark.parametrize(("name", "low", "high"), [("integral", -(2**30), 2**30), ("slope", -(2**31), 2**31 - 1)])
-def test_a_state_with_a_wider_range_is_not_proved(name: str, low: int, high: int) -> None:
+@pytest.mark.parametrize(
+    ("name", "low", "high", "said"),
+    [
+        ("integral", -(2**30), 2**30, "does not fit in 32 bits"),
+        ("slope", -(2**31), 2**31 - 1, "does not fit in 32 bits"),
+        ("error", -1000, 1000, "can leave its allowed range"),
+    ],
+)
+def test_a_state_with_another_range_is_not_proved(
+    name: str, low: int, high: int, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     law = FIXED_LAWS["pid_fixed_point"]
-    with pytest.raises(ProgramError, match="does not fit in 32 bits"):
-        proof(replace(law, state_ranges={**law.state_ranges, name: (low, high)}))
-
-
-def test_a_state_that_may_leave_a_narrower_range_is_not_proved() -> None:
-    law = FIXED_LAWS["pid_fixed_point"]
-    with pytest.raises(ProgramError, match="can leave its allowed range"):
-        proof(replace(law, state_ranges={**law.state_ranges, "error": (-1000, 1000)}))
+    state: Any = declared(type(law.begins))
+    others = {law.numbers: declared(law.numbers), type(law.begins): state._replace(**{name: IntegerRange(low, high)})}
+    monkeypatch.setattr("ppafo.processor.firmware.declared", others.__getitem__)
+    with pytest.raises(ProgramError, match=said):
+        proof(law)
 
 
 def test_drawn_readings_reach_edges_saturation_and_faults() -> None:

@@ -10,8 +10,8 @@ from ppafo.control.kind import ControllerKind
 from ppafo.engine.composer import each
 from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.controlled import TORQUE
-from ppafo.model.declaration import Quantity
-from ppafo.processor.fixed_point import OF_STEPS, SETTINGS, ConverterCounts, converter_of
+from ppafo.model.declaration import Quantity, quantities_of
+from ppafo.processor.fixed_point import SETTINGS, ConverterCounts, converter_of
 
 Sample = Callable[[Any, Any, ConverterCounts], tuple[int, Any]]
 """Law as a function of numbers, state and readings: command [steps], -1000 to 1000, and next state."""
@@ -25,18 +25,20 @@ class FixedLaw:
     """Integer form of a controller of the catalogue.
 
     ``kind`` is the form for the engine: its update reads the converter, calls ``sample``, which is the law itself, and
-    returns the command as a number from -1 to 1. ``numbers`` is the NamedTuple class of the parameters of ``sample``;
-    ``number_quantities`` declare its fields, in order. ``begins`` is the initial state, and ``state_ranges`` contains
-    the lowest and highest value of every state variable by name; the state variable ``sound`` is reported by the
+    returns the command as a number from -1 to 1. ``numbers`` is the NamedTuple class of the parameters of ``sample``,
+    ``begins`` the initial state; both declare the range of each number. The state variable ``sound`` is reported by the
     processor.
     """
 
     kind: ControllerKind
     sample: Sample
     numbers: type
-    number_quantities: tuple[Quantity, ...]
     begins: Any
-    state_ranges: Mapping[str, tuple[int, int]]
+
+    @property
+    def number_quantities(self) -> tuple[Quantity, ...]:
+        """Quantities of the parameters, in order."""
+        return quantities_of(self.numbers)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,17 +100,18 @@ def _span(ends: tuple[Any, Any], run: int) -> str:
 
 def fixed_law(
     floats: ControllerKind,
+    name: str,
     rows: type,
     begins: Any,
     sample: Sample,
     update: Callable[[Any, Any, float, Any, float], tuple[float, Any]],
-    plan: Numbers,
-    state_ranges: Mapping[str, tuple[int, int]],
+    prepare: Callable[[Settings, float, float], tuple[float, ...]] | None = None,
+    largest: Callable[[Settings, float, float], float] | None = None,
 ) -> FixedLaw:
     """Return the integer form of a law, with settings of law and converter, from its row class with ``numbers``."""
     kind = replace(
         floats,
-        name=plan.name,
+        name=name,
         summary=f"{floats.summary} In fixed point, as a small processor computes.",
         quantities=(*floats.quantities, *SETTINGS),
         parameters=rows,
@@ -116,7 +119,6 @@ def fixed_law(
         update=update,
         restart=None,
         controls=(TORQUE,),
-        plan=plan,
+        plan=Numbers(name, quantities_of(rows), prepare, largest),
     )
-    own = plan.quantities[len(OF_STEPS) :]
-    return FixedLaw(kind, sample, get_type_hints(rows)["numbers"], own, begins, state_ranges)
+    return FixedLaw(kind, sample, get_type_hints(rows)["numbers"], begins)

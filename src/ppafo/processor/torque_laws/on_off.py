@@ -4,26 +4,25 @@ Errors are in counts of the converter, commands in steps of 1/1000.
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from ppafo.control.controllers.switching import ON_OFF as FLOAT_ON_OFF
 from ppafo.control.controllers.switching import ON_OFF_DEAD_ZONE as FLOAT_DEAD_ZONE
 from ppafo.engine.composer import each
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.sensors import Measurement
 from ppafo.processor.fixed_point import (
     COMMAND_STEPS,
     LARGEST_READING,
-    OF_LIMITS,
-    OF_STEPS,
     ConverterCounts,
     ConverterLimits,
     CountResolution,
+    Flag,
     error_of,
     read,
     still_sound,
 )
-from ppafo.processor.torque_laws.law import Numbers, fixed_law
+from ppafo.processor.torque_laws.law import fixed_law
 
 
 class _OnOffNumbers(NamedTuple):
@@ -35,7 +34,7 @@ class _OnOffNumbers(NamedTuple):
 class _OnOffCounts(NamedTuple):
     """State of the on/off law: 1 while all readings were valid."""
 
-    sound: int
+    sound: Flag
 
 
 class _OnOffRows(NamedTuple):
@@ -61,15 +60,7 @@ def on_off_update(
     return float(command) / COMMAND_STEPS, each(float, after)
 
 
-ON_OFF = fixed_law(
-    FLOAT_ON_OFF,
-    _OnOffRows,
-    _OnOffCounts(1),
-    on_off_sample,
-    on_off_update,
-    Numbers("on_off_fixed_point", (*OF_STEPS, *OF_LIMITS)),
-    {"sound": (0, 1)},
-)
+ON_OFF = fixed_law(FLOAT_ON_OFF, "on_off_fixed_point", _OnOffRows, _OnOffCounts(1), on_off_sample, on_off_update)
 ON_OFF_FIXED_POINT = ON_OFF.kind
 
 
@@ -77,16 +68,18 @@ class _DeadZoneNumbers(NamedTuple):
     """Numbers of the dead-zone law: reading limits, opening and closing errors [counts], opening [steps]."""
 
     limits: ConverterLimits
-    dead_zone: int
-    release: int
-    opening: int
+    dead_zone: Annotated[
+        int, Number("", "error at which the valve opens, in counts", None, 0.0, float(LARGEST_READING))
+    ]
+    release: Annotated[int, Number("", "error at which it closes again, in counts", None, 0.0, float(LARGEST_READING))]
+    opening: Annotated[int, Number("", "command while it is open, in steps", None, 0.0, float(COMMAND_STEPS))]
 
 
 class _DeadZoneCounts(NamedTuple):
     """State of the dead-zone law: opening direction 1, 0 (closed) or -1, and 1 while all readings were valid."""
 
-    direction: int
-    sound: int
+    direction: Annotated[int, Number("", "direction of opening", None, -1.0, 1.0)]
+    sound: Flag
 
 
 class _DeadZoneRows(NamedTuple):
@@ -132,19 +125,14 @@ def largest_dead_zone(settings: Mapping[str, float], period: float, torque_step:
     return settings["dead_zone"] / torque_step / LARGEST_READING
 
 
-_DEAD_ZONE_NUMBERS = (
-    *OF_LIMITS,
-    Quantity("dead_zone", "", "error at which the valve opens, in counts", None, 0.0, float(LARGEST_READING)),
-    Quantity("release", "", "error at which it closes again, in counts", None, 0.0, float(LARGEST_READING)),
-    Quantity("opening", "", "command while it is open, in steps", None, 0.0, float(COMMAND_STEPS)),
-)
 DEAD_ZONE = fixed_law(
     FLOAT_DEAD_ZONE,
+    "on_off_dead_zone_fixed_point",
     _DeadZoneRows,
     _DeadZoneCounts(0, 1),
     dead_zone_sample,
     dead_zone_update,
-    Numbers("on_off_dead_zone_fixed_point", (*OF_STEPS, *_DEAD_ZONE_NUMBERS), prepare_dead_zone, largest_dead_zone),
-    {"direction": (-1, 1), "sound": (0, 1)},
+    prepare_dead_zone,
+    largest_dead_zone,
 )
 DEAD_ZONE_FIXED_POINT = DEAD_ZONE.kind

@@ -6,11 +6,12 @@ commands, the slope 8191 counts per sample, the anti-windup correction 32 full c
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from functools import partial
+from typing import Annotated, NamedTuple
 
 from ppafo.control.controllers.pid import PID as FLOAT_PID
 from ppafo.engine.composer import each
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.sensors import Measurement
 from ppafo.processor.fixed_point import (
     COMMAND_STEPS,
@@ -18,11 +19,10 @@ from ppafo.processor.fixed_point import (
     LARGEST_FRACTION,
     LARGEST_READING,
     MOST_PLACES,
-    OF_LIMITS,
-    OF_STEPS,
     ConverterCounts,
     ConverterLimits,
     CountResolution,
+    Flag,
     beyond_band,
     error_of,
     fraction_of,
@@ -32,7 +32,7 @@ from ppafo.processor.fixed_point import (
     shifted,
     still_sound,
 )
-from ppafo.processor.torque_laws.law import Numbers, fixed_law
+from ppafo.processor.torque_laws.law import fixed_law
 
 PART_BITS = 6
 HALF_STEP = 2 ** (PART_BITS - 1)
@@ -59,29 +59,33 @@ _LARGEST_ERROR = 2 * LARGEST_READING
 """Largest error [counts]: reference and pressure difference each span one range."""
 
 
+_FRACTION = partial(Number, "", minimum=0.0, maximum=float(LARGEST_FRACTION))
+_PLACES = Number("", "and the places it is shifted right by", None, 0.0, float(MOST_PLACES))
+
+
 class _PidNumbers(NamedTuple):
     """Numbers of the PID law: reading limits, gains as fractions and shifts, other fractions in 1/2^15."""
 
     limits: ConverterLimits
-    proportional: int
-    proportional_places: int
-    integral: int
-    integral_places: int
-    derivative: int
-    derivative_places: int
-    filter_share: int
-    anti_windup: int
-    dead_band: int
+    proportional: Annotated[int, _FRACTION("k_p: part of a step for a count of the error")]
+    proportional_places: Annotated[int, _PLACES]
+    integral: Annotated[int, _FRACTION("k_i: fine parts for a count of the error at each sample")]
+    integral_places: Annotated[int, _PLACES]
+    derivative: Annotated[int, _FRACTION("k_d: part of a step for a change of the error")]
+    derivative_places: Annotated[int, _PLACES]
+    filter_share: Annotated[int, _FRACTION("share of a change that the slope takes at once, in 1/2^15")]
+    anti_windup: Annotated[int, _FRACTION("share of the excess that is pulled back, in 1/2^15")]
+    dead_band: Annotated[int, _FRACTION("dead band of the valve, in 1/2^15")]
 
 
 class _PidCounts(NamedTuple):
     """State of the PID law: integral, error [counts], slope [1/65536 counts], start flag, validity flag."""
 
-    integral: int
-    error: int
-    slope: int
-    started: int
-    sound: int
+    integral: Annotated[int, Number("", "integral", None, -LARGEST_INTEGRAL, LARGEST_INTEGRAL)]
+    error: Annotated[int, Number("", "error", None, -_LARGEST_ERROR, _LARGEST_ERROR)]
+    slope: Annotated[int, Number("", "slope", None, -LARGEST_SLOPE, LARGEST_SLOPE)]
+    started: Flag
+    sound: Flag
 
 
 class _PidRows(NamedTuple):
@@ -160,34 +164,14 @@ def largest_pid(settings: Mapping[str, float], period: float, torque_step: float
     return max(*gains, anti_windup * LARGEST_FRACTION) / LARGEST_FRACTION
 
 
-_MOST_OF_FRACTION, _MOST_PLACES = float(LARGEST_FRACTION), float(MOST_PLACES)
-_PID_NUMBERS = (
-    *OF_LIMITS,
-    Quantity("proportional", "", "k_p: part of a step for a count of the error", None, 0.0, _MOST_OF_FRACTION),
-    Quantity("proportional_places", "", "and the places it is shifted right by", None, 0.0, _MOST_PLACES),
-    Quantity("integral", "", "k_i: fine parts for a count of the error at each sample", None, 0.0, _MOST_OF_FRACTION),
-    Quantity("integral_places", "", "and the places it is shifted right by", None, 0.0, _MOST_PLACES),
-    Quantity("derivative", "", "k_d: part of a step for a change of the error", None, 0.0, _MOST_OF_FRACTION),
-    Quantity("derivative_places", "", "and the places it is shifted right by", None, 0.0, _MOST_PLACES),
-    Quantity(
-        "filter_share", "", "share of a change that the slope takes at once, in 1/2^15", None, 0.0, _MOST_OF_FRACTION
-    ),
-    Quantity("anti_windup", "", "share of the excess that is pulled back, in 1/2^15", None, 0.0, _MOST_OF_FRACTION),
-    Quantity("dead_band", "", "dead band of the valve, in 1/2^15", None, 0.0, _MOST_OF_FRACTION),
-)
 PID = fixed_law(
     FLOAT_PID,
+    "pid_fixed_point",
     _PidRows,
     _PidCounts(integral=0, error=0, slope=0, started=0, sound=1),
     pid_sample,
     pid_update,
-    Numbers("pid_fixed_point", (*OF_STEPS, *_PID_NUMBERS), prepare_pid, largest_pid),
-    {
-        "integral": (-LARGEST_INTEGRAL, LARGEST_INTEGRAL),
-        "error": (-_LARGEST_ERROR, _LARGEST_ERROR),
-        "slope": (-LARGEST_SLOPE, LARGEST_SLOPE),
-        "started": (0, 1),
-        "sound": (0, 1),
-    },
+    prepare_pid,
+    largest_pid,
 )
 PID_FIXED_POINT = PID.kind
