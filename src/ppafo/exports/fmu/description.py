@@ -1,7 +1,6 @@
 """modelDescription.xml of FMI 2 and 3: variables, units and capabilities of an FMU."""
 
 from collections.abc import Iterable
-from typing import Any
 from xml.etree import ElementTree as Xml
 
 from ppafo.exports.fmu.interface import FmuVariable, Interface, variables_of
@@ -31,73 +30,63 @@ _DISPLAY_UNITS = {
 _CLOCK = "clock of the controller, ticks every controller.period"
 
 
-def description_of_fmi2(interface: Interface, identifier: str, token: str) -> bytes:
-    """Return modelDescription.xml of FMI 2.0; ``identifier`` names the library, ``token`` identifies its sources."""
-    variables = variables_of(interface)
-    root = Xml.Element("fmiModelDescription", _head("2.0", interface, guid=token))
-    kind = Xml.SubElement(
-        root,
-        "CoSimulation",
-        modelIdentifier=identifier,
-        canGetAndSetFMUstate="true",
-        canSerializeFMUstate="true",
-        canNotUseMemoryManagementFunctions="true",
-        canHandleVariableCommunicationStepSize=str(interface.plant is None).lower(),
-    )
-    # One file that takes the others in: tools that build from source need no list.
-    Xml.SubElement(Xml.SubElement(kind, "SourceFiles"), "File", name="fmi2.c")
-    _add_units_and_experiment(root, interface, variables)
-    table = Xml.SubElement(root, "ModelVariables")
-    # FMI 2 counts variables by their place in the list, from 1.
-    places = {variable.number: index for index, variable in enumerate(variables, start=1)}
-    for variable in variables:
-        of_variable, of_number = _attributes(variable)
-        Xml.SubElement(Xml.SubElement(table, "ScalarVariable", of_variable), "Real", of_number)
-    outputs = [places[variable.number] for variable in variables if variable.causality == "output"]
-    structure = Xml.SubElement(root, "ModelStructure")
-    # Outputs of a step depend on no input of that instant.
-    for name, known in (("Outputs", {"dependencies": ""}), ("InitialUnknowns", {})):
-        section = Xml.SubElement(structure, name) if outputs else structure
-        for index in outputs:
-            Xml.SubElement(section, "Unknown", {"index": str(index), **known})
-    return _text(root)
+def model_description(interface: Interface, fmi: int, identifier: str, token: str) -> bytes:
+    """Return modelDescription.xml of FMI 2.0 or 3.0.
 
-
-def description_of_fmi3(interface: Interface, identifier: str, token: str) -> bytes:
-    """Return modelDescription.xml of FMI 3.0; ``identifier`` names the library, ``token`` identifies its sources."""
-    variables = variables_of(interface)
-    root = Xml.Element("fmiModelDescription", _head("3.0", interface, instantiationToken=token))
-    has_clock = str(interface.plant is None).lower()
-    internal: dict[str, Any] = {"fixedInternalStepSize": repr(interface.step)} if interface.plant is not None else {}
-    Xml.SubElement(
-        root,
-        "CoSimulation",
-        modelIdentifier=identifier,
-        canGetAndSetFMUState="true",
-        canSerializeFMUState="true",
-        canHandleVariableCommunicationStepSize=str(interface.plant is None).lower(),
-        hasEventMode=has_clock,
-        mightReturnEarlyFromDoStep=has_clock,
-        **internal,
+    ``identifier`` names the library, ``token`` identifies its sources.
+    """
+    variables, is_alone = variables_of(interface), interface.plant is not None
+    root = Xml.Element(
+        "fmiModelDescription",
+        {
+            "fmiVersion": f"{fmi}.0",
+            "modelName": interface.library.title,
+            "guid" if fmi == 2 else "instantiationToken": token,
+            "description": interface.library.description,
+            "version": __version__,
+            "license": "MIT",
+            "generationTool": f"ppafo {__version__}",
+            "variableNamingConvention": "structured",
+        },
     )
+    state, is_loop = ("state" if fmi == 2 else "State"), str(not is_alone).lower()
+    able = {"modelIdentifier": identifier, f"canGetAndSetFMU{state}": "true", f"canSerializeFMU{state}": "true"}
+    able |= {"canNotUseMemoryManagementFunctions": "true"} if fmi == 2 else {}
+    able["canHandleVariableCommunicationStepSize"] = is_loop
+    if fmi == 3:
+        able |= {"hasEventMode": is_loop, "mightReturnEarlyFromDoStep": is_loop}
+        able |= {"fixedInternalStepSize": repr(interface.step)} if is_alone else {}
+    kind = Xml.SubElement(root, "CoSimulation", able)
+    if fmi == 2:
+        # One file that takes the others in: tools that build from source need no list.
+        Xml.SubElement(Xml.SubElement(kind, "SourceFiles"), "File", name="fmi2.c")
     _add_units_and_experiment(root, interface, variables)
     table = Xml.SubElement(root, "ModelVariables")
     # Clock and time get numbers behind all variables of the C.
-    first = 1 + max(variable.number for variable in variables)
-    if interface.plant is None:
-        clock = {"valueReference": str(first), "description": _CLOCK, "causality": "output"}
-        Xml.SubElement(table, "Clock", {"name": "controller.clock", **clock, "intervalVariability": "triggered"})
-    time = {"name": "time", "valueReference": str(first + 1), "description": "time", "causality": "independent"}
-    Xml.SubElement(table, "Float64", {**time, "variability": "continuous", "unit": "s"})
+    clock = 1 + max(variable.number for variable in variables)
+    if fmi == 3:
+        if not is_alone:
+            ticks = {"valueReference": str(clock), "description": _CLOCK, "causality": "output"}
+            Xml.SubElement(table, "Clock", {"name": "controller.clock", **ticks, "intervalVariability": "triggered"})
+        time = {"name": "time", "valueReference": str(clock + 1), "description": "time", "causality": "independent"}
+        Xml.SubElement(table, "Float64", {**time, "variability": "continuous", "unit": "s"})
     for variable in variables:
         of_variable, of_number = _attributes(variable)
-        Xml.SubElement(table, "Float64", of_variable | of_number)
+        if fmi == 2:
+            Xml.SubElement(Xml.SubElement(table, "ScalarVariable", of_variable), "Real", of_number)
+        else:
+            Xml.SubElement(table, "Float64", of_variable | of_number)
+    # FMI 2 counts variables by their place in the list, from 1.
+    places = enumerate(variables, start=1)
+    outputs = [at if fmi == 2 else one.number for at, one in places if one.causality == "output"]
+    outputs += [clock] if fmi == 3 and not is_alone else []
     structure = Xml.SubElement(root, "ModelStructure")
-    outputs = [variable.number for variable in variables if variable.causality == "output"]
-    outputs += [first] if interface.plant is None else []
+    # Outputs of a step depend on no input of that instant.
     for name, known in {"Output": {"dependencies": ""}, "InitialUnknown": {}}.items():
+        section = Xml.SubElement(structure, f"{name}s") if fmi == 2 and outputs else structure
         for number in outputs:
-            Xml.SubElement(structure, name, {"valueReference": str(number), **known})
+            reference = {"index" if fmi == 2 else "valueReference": str(number)}
+            Xml.SubElement(section, "Unknown" if fmi == 2 else name, reference | known)
     return _text(root)
 
 
@@ -108,19 +97,6 @@ def build_description_of_fmi3(identifier: str, flags: str) -> bytes:
     sources = Xml.SubElement(built, "SourceFileSet", language="C99", compilerOptions=flags)
     Xml.SubElement(sources, "SourceFile", name="fmi3.c")
     return _text(root)
-
-
-def _head(version: str, interface: Interface, **further: str) -> dict[str, str]:
-    return {
-        "fmiVersion": version,
-        "modelName": interface.library.title,
-        **further,
-        "description": interface.library.description,
-        "version": __version__,
-        "license": "MIT",
-        "generationTool": f"ppafo {__version__}",
-        "variableNamingConvention": "structured",
-    }
 
 
 def _attributes(variable: FmuVariable) -> tuple[dict[str, str], dict[str, str]]:

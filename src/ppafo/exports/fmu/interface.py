@@ -1,7 +1,7 @@
 """Interface of an FMU, closed loop or plant driven by the importing tool, and its variables."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.files import OUTPUTS
@@ -110,29 +110,18 @@ def variables_of(interface: Interface) -> tuple[FmuVariable, ...]:
     The C code uses the same numbers; these also count hidden settings.
     """
     library, program = interface.library, interface.library.program
-    variables = []
-    for number, setting in enumerate(library.settings):
-        tuning, quantity = tuning_of(interface, setting), setting.quantity
-        if tuning != "hidden":
-            ends = (quantity.minimum, quantity.maximum)
-            limits = (limit if abs(limit) < _LARGEST_LIMIT else None for limit in ends)
-            meaning = library.worded(quantity.summary or quantity.name)
-            variables.append(
-                FmuVariable(setting.path, number, quantity.unit, meaning, "parameter", tuning, setting.value, *limits)
-            )
-    first_output = len(library.settings)
-    for number, name in enumerate(program.outputs, start=first_output):
-        unit, summary = OUTPUTS[name]
-        variables.append(FmuVariable(name, number, unit, library.worded(summary), "output", variability_of(name)))
-    first_metric = first_output + len(program.outputs)
-    for number, metric in enumerate(program.metrics, start=first_metric):
-        variables.append(
-            FmuVariable(
-                f"metrics.{metric.name}", number, metric.unit, library.worded(metric.summary), "local", "continuous"
-            )
-        )
-    for number, item in enumerate(interface.inputs, start=first_metric + len(program.metrics)):
-        values = item.start, item.minimum, item.maximum
-        meaning = library.worded(item.summary)
-        variables.append(FmuVariable(item.name, number, item.unit, meaning, "input", "continuous", *values))
-    return tuple(variables)
+    rows: list[tuple[Any, ...]] = []
+    for setting in library.settings:
+        quantity, tuning = setting.quantity, tuning_of(interface, setting)
+        limits = (end if abs(end) < _LARGEST_LIMIT else None for end in (quantity.minimum, quantity.maximum))
+        meaning = quantity.summary or quantity.name
+        rows.append((setting.path, quantity.unit, meaning, "parameter", tuning, setting.value, *limits))
+    rows += ((name, *OUTPUTS[name], "output", variability_of(name)) for name in program.outputs)
+    rows += ((f"metrics.{one.name}", one.unit, one.summary, "local", "continuous") for one in program.metrics)
+    for item in interface.inputs:
+        rows.append((item.name, item.unit, item.summary, "input", "continuous", item.start, item.minimum, item.maximum))
+    return tuple(
+        FmuVariable(name, number, unit, library.worded(summary), *rest)
+        for number, (name, unit, summary, *rest) in enumerate(rows)
+        if "hidden" not in rest
+    )

@@ -13,13 +13,13 @@ from contextlib import closing
 from ctypes import c_bool, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, final
+from typing import Any
 
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports import filled, template
 from ppafo.exports.c_library.files import expected_csv, library_files
 from ppafo.exports.c_library.plant import EXAMPLE, follow_lines
-from ppafo.exports.fmu.description import build_description_of_fmi3, description_of_fmi2, description_of_fmi3
+from ppafo.exports.fmu.description import build_description_of_fmi3, model_description
 from ppafo.exports.fmu.interface import Interface, tuning_of, variability_of, variables_of
 from ppafo.exports.fmu.platforms import FLAGS, PLATFORMS, build, host_platform
 from ppafo.storage.files import temporary_folder
@@ -32,7 +32,6 @@ _HEADERS = {
     2: ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
     3: ("fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h"),
 }
-_DESCRIBED = {2: description_of_fmi2, 3: description_of_fmi3}
 _CALLS = {2: ("fmi2.c", "fmi2_steps.c"), 3: ("fmi3.c",)}
 """Templates of the functions of FMI, by version."""
 _LOOP = (
@@ -52,74 +51,47 @@ _CO_SIMULATION = 1
 """Instance type fmi2CoSimulation of FMI 2."""
 
 
-@final
-class _Fmi2:
-    """Instance of FMI 2; its calls return the status, 0 for success."""
+class _Instance:
+    """Instance of a unit, in FMI 3 without event mode; calls return the status, 0 for success."""
 
-    def __init__(self, library: ctypes.CDLL, token: str) -> None:
-        self.library = library
-        library.fmi2Instantiate.restype = c_void_p
-        words = (c_char_p(_NAME), c_int(_CO_SIMULATION), c_char_p(token.encode()), c_char_p(None))
-        self.instance = c_void_p(library.fmi2Instantiate(*words, c_void_p(None), c_int(0), c_int(0)))
+    def __init__(self, library: ctypes.CDLL, fmi: int, token: str) -> None:
+        self.library, self.fmi = library, fmi
+        name, word, none = c_char_p(_NAME), c_char_p(token.encode()), c_void_p(None)
+        words: tuple[Any, ...] = (name, word, none, *(c_bool(False),) * 4, none, c_size_t(0), none, none, none)
+        if fmi == 2:
+            words = (name, c_int(_CO_SIMULATION), word, none, none, c_int(0), c_int(0))
+        make = library["fmi2Instantiate" if fmi == 2 else "fmi3InstantiateCoSimulation"]
+        make.restype = c_void_p
+        self.instance = c_void_p(make(*words))
+
+    def call(self, function: str, *arguments: Any) -> int:
+        """Call a function of the instance."""
+        return int(self.library[f"fmi{self.fmi}{function}"](self.instance, *arguments))
 
     def begin(self, numbers: Any, values: Any) -> int:
-        """Set the inputs and initialise up to the first sample; return the status."""
+        """Set the inputs and initialise up to the first sample."""
         experiment = (c_int(0), c_double(0.0), c_double(0.0), c_int(0), c_double(0.0))
-        return int(
-            self.library.fmi2SetupExperiment(self.instance, *experiment)
-            or self.library.fmi2EnterInitializationMode(self.instance)
-            or self.library.fmi2SetReal(self.instance, numbers, c_size_t(len(numbers)), values)
-            or self.library.fmi2ExitInitializationMode(self.instance)
-        )
+        if self.fmi == 2:
+            begun = self.call("SetupExperiment", *experiment) or self.call("EnterInitializationMode")
+        else:
+            begun = self.call("EnterInitializationMode", *experiment)
+        return begun or self.exchange("Set", numbers, values) or self.call("ExitInitializationMode")
 
     def advance(self, time: float, length: float) -> int:
-        """Perform one communication step of ``length`` [s] from ``time`` [s]; return the status."""
-        return int(self.library.fmi2DoStep(self.instance, c_double(time), c_double(length), c_int(1)))
+        """Perform one communication step of ``length`` [s] from ``time`` [s]."""
+        found = [*(ctypes.byref(c_bool()) for _ in range(3)), ctypes.byref(c_double())] if self.fmi == 3 else []
+        return self.call("DoStep", c_double(time), c_double(length), c_int(1), *found)
 
-    def read(self, numbers: Any, values: Any) -> int:
-        """Read outputs into ``values``; return the status."""
-        return int(self.library.fmi2GetReal(self.instance, numbers, c_size_t(len(numbers)), values))
+    def exchange(self, verb: str, numbers: Any, values: Any) -> int:
+        """Set inputs, or get outputs into ``values``."""
+        count = c_size_t(len(numbers))
+        if self.fmi == 2:
+            return self.call(f"{verb}Real", numbers, count, values)
+        return self.call(f"{verb}Float64", numbers, count, values, count)
 
     def close(self) -> None:
         """Free the instance."""
-        self.library.fmi2FreeInstance(self.instance)
-
-
-@final
-class _Fmi3:
-    """Instance of FMI 3, without event mode, with the methods of ``_Fmi2``."""
-
-    def __init__(self, library: ctypes.CDLL, token: str) -> None:
-        self.library = library
-        library.fmi3InstantiateCoSimulation.restype = c_void_p
-        flags = (c_bool(False),) * 4
-        nothing = (c_void_p(None), c_size_t(0), c_void_p(None), c_void_p(None), c_void_p(None))
-        words = (c_char_p(_NAME), c_char_p(token.encode()), c_char_p(None))
-        self.instance = c_void_p(library.fmi3InstantiateCoSimulation(*words, *flags, *nothing))
-
-    def begin(self, numbers: Any, values: Any) -> int:
-        """Set the inputs and initialise up to the first sample; return the status."""
-        count = c_size_t(len(numbers))
-        experiment = (c_bool(False), c_double(0.0), c_double(0.0), c_bool(False), c_double(0.0))
-        return int(
-            self.library.fmi3EnterInitializationMode(self.instance, *experiment)
-            or self.library.fmi3SetFloat64(self.instance, numbers, count, values, count)
-            or self.library.fmi3ExitInitializationMode(self.instance)
-        )
-
-    def advance(self, time: float, length: float) -> int:
-        """Perform one communication step of ``length`` [s] from ``time`` [s]; return the status."""
-        flags, last = [ctypes.byref(c_bool()) for _ in range(3)], ctypes.byref(c_double())
-        return int(self.library.fmi3DoStep(self.instance, c_double(time), c_double(length), c_bool(True), *flags, last))
-
-    def read(self, numbers: Any, values: Any) -> int:
-        """Read outputs into ``values``; return the status."""
-        count = c_size_t(len(numbers))
-        return int(self.library.fmi3GetFloat64(self.instance, numbers, count, values, count))
-
-    def close(self) -> None:
-        """Free the instance."""
-        self.library.fmi3FreeInstance(self.instance)
+        self.call("FreeInstance")
 
 
 def check_unit(interface: Interface, fmi: int, token: str, library: bytes) -> None:
@@ -139,8 +111,7 @@ def check_unit(interface: Interface, fmi: int, token: str, library: bytes) -> No
             raise ProgramError(
                 f"{interface.library.title}: the FMU was built but cannot be loaded here: {error}"
             ) from error
-        instance: _Fmi2 | _Fmi3 = _Fmi2(functions, token) if fmi == 2 else _Fmi3(functions, token)
-        with closing(instance):
+        with closing(_Instance(functions, fmi, token)) as instance:
             output_numbers = _array(c_uint, [numbers[name] for name in outputs])
             values = (c_double * len(outputs))()
             status = instance.begin(
@@ -150,7 +121,7 @@ def check_unit(interface: Interface, fmi: int, token: str, library: bytes) -> No
             for time, *expected in rows:
                 if time > 0.0:
                     status = status or instance.advance(previous_time, time - previous_time)
-                status = status or instance.read(output_numbers, values)
+                status = status or instance.exchange("Get", output_numbers, values)
                 previous_time = time
                 for name, value, python_value in zip(outputs, values, expected, strict=True):
                     if status or value != python_value:
@@ -198,7 +169,7 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
         "flags": " ".join(FLAGS),
     }
     contents = {
-        "modelDescription.xml": _DESCRIBED[fmi](interface, identifier, token),
+        "modelDescription.xml": model_description(interface, fmi, identifier, token),
         "documentation/index.html": filled(template("ppafo.exports.fmu", "index.html"), words).encode(),
         "documentation/licenses/license.txt": template("ppafo.exports.c_library", "LICENSE").encode(),
         **{f"sources/{name}": content for name, content in sources.items()},
