@@ -83,7 +83,7 @@ def solve_by_samples(run: Run, advance: Interval) -> Floats:
     controller, period = run.program.controller, run.period
     if controller is None:
         raise ValueError("the benchmark runs controllers of the catalogue only")
-    unknowns = np.array([*numbers(run.initial), *numbers(run.program.valve.initial())])
+    unknowns = np.array([*numbers(run.initial), *numbers(run.program.valve.state())])
     states = np.empty((run.step_count // run.steps_per_sample + 1, PLANT_UNKNOWNS))
     states[0] = unknowns[:PLANT_UNKNOWNS]
     memory = controller.initial

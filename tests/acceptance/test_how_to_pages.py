@@ -118,7 +118,7 @@ def test_a_valve_does_with_a_command_what_the_page_says(kind: str, command: floa
     settings = VALVES[kind].settings(*(item.default or 0.0 for item in VALVES[kind].quantities))
     model = VALVES[kind].choose(settings)
     valve = model.prepare(settings)
-    state = model.settle(valve, model.initial(), command, 0.0)
+    state = model.settle(valve, model.state(), command, 0.0)
     assert tuple(model.instant(valve, state, command)) == pytest.approx(expected)
 
 

@@ -132,7 +132,7 @@ def test_valve_models_show_the_reference_solver_openings_between_0_and_1(
         assert model.regulates
         return
     for command in (-1.0, -0.3, 0.0, 0.4, 1.0):
-        state = model.settle(valve, model.initial(), command, 0.0)
+        state = model.settle(valve, model.state(), command, 0.0)
         openings = model.instant(valve, state, command)
         assert isinstance(openings, Openings), name
         assert all(0.0 <= share <= 1.0 for share in openings)
@@ -144,7 +144,7 @@ def test_valve_models_show_the_reference_solver_openings_between_0_and_1(
 
 @pytest.mark.parametrize(("name", "model", "settings"), valve_models())
 def test_valve_states_survive_the_way_through_rows(name: str, model: ValveModel, settings: Any) -> None:
-    state = model.settle(model.prepare(settings), model.initial(), 0.6, 0.0)
+    state = model.settle(model.prepare(settings), model.state(), 0.6, 0.0)
     assert rebuilt(model.state, map(float, numbers(state))) == state, name
 
 

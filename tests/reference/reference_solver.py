@@ -6,13 +6,13 @@ and stops as the modes between which the solver switches; then the solution; las
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.continuous_time import mode_at_rest, torque_at_rest
-from ppafo.engine.entries import with_arrays
 from ppafo.engine.in_python import in_program
 from ppafo.engine.lanes import BatchResult, run_batch, samples_in
 from ppafo.engine.rows import leaf_paths, numbers, rebuilt
@@ -187,10 +187,10 @@ def load_right_hand_side(run: Run) -> RightHandSide:
         *run.effects,
     )
     parameters = np.array([number for group in groups for number in numbers(group)])
-    y = np.empty(unknowns_before_valve(program) + len(numbers(program.valve.initial())))
+    y = np.empty(unknowns_before_valve(program) + len(numbers(program.valve.state())))
     slopes = np.empty_like(y)
     compiled = load_source(right_hand_side_source(program)).fill
-    return RightHandSide(y, slopes, with_arrays(compiled, y, slopes, parameters))
+    return RightHandSide(y, slopes, partial(compiled, y, slopes, parameters))
 
 
 def solve_reference(run: Run, tolerance: float = 1e-10) -> ReferenceResult:
@@ -212,7 +212,7 @@ class _Solution:
         self.run = run
         masses = [run.initial.mass_1, run.initial.mass_2] if run.program.is_thermal else []
         stated = [number for state in states_at_start(run) for number in numbers(state)]
-        self.y = np.array([*numbers(run.initial), *masses, *stated, *numbers(run.program.valve.initial())])
+        self.y = np.array([*numbers(run.initial), *masses, *stated, *numbers(run.program.valve.state())])
         self.valve_from = unknowns_before_valve(run.program)
         self.show = in_program(shown_signals, run.program, run.effects)
         self.limit = in_program(friction_at_rest, run.program, run.effects)

@@ -128,7 +128,7 @@ def test_hysteresis_and_resolution_are_those_of_the_settings_and_a_vent_sets_the
     valve = MODEL.prepare(RegulatorSettings(1.0e5, 6.0e5, 0.0, 0.0, 0.01, 0.02, 0.01))
 
     def course(commands: list[float]) -> list[float]:
-        state, found = MODEL.initial(), []
+        state, found = MODEL.state(), []
         for command in commands:
             shown, state = MODEL.advance(valve, state, command, 0.0, 1e-3)
             found.append(shown.second_1)

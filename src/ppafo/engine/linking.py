@@ -10,7 +10,6 @@ from ppafo.errors import ProgramError
 from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
 from ppafo.model.plant import PlantParameters, net_torque, viscous_torque
 from ppafo.model.ports import exhaust_path, supply_path
-from ppafo.model.valves.kind import valve_problem
 
 TEST_ANGLES = (1.0, 1.5)
 """Angles [rad] at which the torque on a joint at rest is tested; a spring is relaxed at one of them at most."""
@@ -21,10 +20,22 @@ def link_program(program: Program, replacements: Replacements) -> None:
 
     Raises ProgramError for an effect that cannot act, or whose name is already used by other rows of the program.
     """
-    problem = valve_problem(program.valve)
-    if problem:
-        raise ProgramError(f"{place_of(program.valve.connect)}: {problem}")
-    check_ports()
+    if program.valve.shown is None:
+        raise ProgramError(
+            f"{place_of(program.valve.connect)}: the output of the valve must be annotated with its class"
+        )
+    for path in (supply_path, exhaust_path):
+        closed = path(0.0)
+        if closed != 0.0:
+            raise ProgramError(f"{place_of(path)}: {path.__name__} of a closed valve is {closed:.4g} kg/(s Pa), not 0")
+    # Friction and stops balance ``load_torque`` alone at rest: a spring missing there would move a joint at rest.
+    at_rest = [net_torque(0.0, 0.0, 0.0, 0.0, angle, 0.0) for angle in TEST_ANGLES]
+    for function, torque in ((viscous_torque, viscous_torque(0.0, 0.0)), (net_torque, -max(at_rest, key=abs))):
+        if torque != 0.0:
+            raise ProgramError(
+                f"{place_of(function)}: {function.__name__} subtracts {torque:.4g} N m at rest, which friction "
+                "does not balance; subtract this torque in load_torque of ppafo.model.ports"
+            )
     if program.actuator.plant is not PlantParameters:
         replacements.constructed[PlantParameters] = program.actuator.plant
     if not program.effects:
@@ -38,30 +49,6 @@ def link_program(program: Program, replacements: Replacements) -> None:
                 f"effect '{effect.name}': a component of the program already has this name; rename the effect"
             )
     link_effects(program.effects, replacements)
-
-
-def check_ports() -> None:
-    """Raise ProgramError for a flow through a closed valve, and a torque on a joint at rest beside ``load_torque``.
-
-    ``load_torque`` is the load that friction and stops balance at rest: a spring missing there would move a joint at
-    rest.
-    """
-    for path in (supply_path, exhaust_path):
-        closed = path(0.0)
-        if closed != 0.0:
-            raise ProgramError(f"{place_of(path)}: {path.__name__} of a closed valve is {closed:.4g} kg/(s Pa), not 0")
-    at_rest = [net_torque(0.0, 0.0, 0.0, 0.0, angle, 0.0) for angle in TEST_ANGLES]
-    damping = viscous_torque(0.0, 0.0)
-    if damping != 0.0:
-        raise ProgramError(
-            f"{place_of(viscous_torque)}: viscous_torque is {damping:.4g} N m at rest, where there is none; subtract "
-            "this torque in load_torque of ppafo.model.ports"
-        )
-    if any(at_rest):
-        raise ProgramError(
-            f"{place_of(net_torque)}: net_torque subtracts {-max(at_rest, key=abs):.4g} N m at rest, which friction "
-            "does not balance; subtract this torque in load_torque of ppafo.model.ports"
-        )
 
 
 def link_effects(effects: Sequence[Effect], replacements: Replacements) -> None:

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from functools import lru_cache
 from types import ModuleType
-from typing import Any
 
 from ppafo.control.kind import DEAD_BAND, OPEN_LOOP, ControllerKind, ProfileKind
 from ppafo.control.profiles import CONSTANT
@@ -205,14 +204,9 @@ class Program:
         return bool(self.meters or self.traced)
 
     @property
-    def initial_controller_state(self) -> Any:
-        """State of the controller before its first sample."""
-        return None if self.controller is None else self.controller.initial
-
-    @property
     def has_phase(self) -> bool:
         """True if the controller of a walk detects the gait phase."""
-        return hasattr(getattr(self.initial_controller_state, "phase", None), "phase")
+        return hasattr(getattr(getattr(self.controller, "initial", None), "phase", None), "phase")
 
     @property
     def requests_torque(self) -> bool:

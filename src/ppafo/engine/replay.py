@@ -105,7 +105,7 @@ def _with_valves_after(batch: Batch, earlier: Floats) -> Floats:
 
     def valve_at_start(valve: Any, timing: LaneTiming) -> Any:
         begins = (changes - earlier.size + delay + timing.command_lag) * timing.step
-        state, time = program.valve.initial(), _LONG_AGO
+        state, time = program.valve.state(), _LONG_AGO
         for command, end in zip(commands, [*begins.tolist(), 0.0], strict=True):
             while time < end:
                 settled = program.valve.settle(valve, state, command, time)

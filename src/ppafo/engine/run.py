@@ -54,22 +54,6 @@ class Walk:
     sensors: GaitSensors
     initial: "WalkState"
 
-    @property
-    def parameters(self) -> dict[str, Any]:
-        """Groups of parameters of the leg and its gait, by name."""
-        return {
-            "leg": self.leg,
-            "share": self.share,
-            "gait": self.gait,
-            "gait_timing": self.timing,
-            "gait_sensors": self.sensors,
-        }
-
-    @property
-    def states(self) -> dict[str, Any]:
-        """Groups of initial states, by name."""
-        return {"walk": self.initial, "gait_seen": NOTHING_SEEN}
-
 
 @dataclass(frozen=True, slots=True)
 class Lines:
@@ -176,17 +160,27 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
         own = replace(program, is_adaptive=bool(needs_parts), samples_inside=not every.is_integer())
         every = every if own.samples_inside else int(every)
         ticks = Clock(int(step_count), int(steps_per_sample), every, int(signal_delay), int(command_delay))
-        ordered = members[_alike_together(run, runs, members)] if own.is_adaptive and members.size > 1 else members
+        ordered = members
+        if own.is_adaptive and members.size > 1:
+            # The runs of a block wait for the slowest at every step; when a vane moves depends on how long its valve
+            # takes to move the gas.
+            plant = run.plant
+            swept = plant.displacement_per_radian * (plant.angle_max - plant.angle_min)
+            gas = plant.dead_volume_1 + plant.dead_volume_2 + swept
+            duration = np.broadcast_to(gas / (plant.valve_conductance * plant.gas_product), (runs,))
+            ordered = members[np.argsort(duration[members], kind="stable")]
         batches.append((ordered, Batch(own, ticks, parameters[:, ordered], states[:, ordered])))
     return batches
 
 
 def _parameters_of(run: Run, timing: LaneTiming) -> dict[str, Any]:
     """Return the groups of parameters of a run, by name."""
+    walk = run.walk
+    of_walk = ("leg", "share", "gait", "gait_timing", "gait_sensors")
     return {
         "timing": timing,
         **{name: getattr(run, name) for name in _GROUPS_OF_RUN},
-        **({} if run.walk is None else run.walk.parameters),
+        **({} if walk is None else {name: getattr(walk, name.removeprefix("gait_")) for name in of_walk}),
         **({} if run.lines is None else {"lines": run.lines.parameters}),
         **({} if run.leg is None else {"load": run.leg.load, "shank": run.leg.shank}),
         **{effect.name: row for effect, row in zip(run.program.effects, run.effects, strict=True)},
@@ -201,32 +195,13 @@ def _states_of(run: Run) -> dict[str, Any]:
         "result": AT_REST,
         "pace": StepControl(run.step),
         "state": run.initial,
-        "masses": gas_at_start(run),
-        "valve_state": program.valve.initial(),
+        "masses": masses_at_start(run.initial) if program.is_thermal else NoParameters(),
+        "valve_state": program.valve.state(),
         "controller_state": NoParameters() if program.controller is None else program.controller.initial,
-        **({} if run.walk is None else run.walk.states),
+        **({} if run.walk is None else {"walk": run.walk.initial, "gait_seen": NOTHING_SEEN}),
         **({} if run.lines is None else {"line_state": run.lines.initial}),
         **dict(zip(program.effect_states, states_at_start(run), strict=True)),
     }
-
-
-def _alike_together(run: Run, runs: int, members: Members) -> Members:
-    """Return runs sorted by the time that their valves take to move the gas, so that blocks contain similar runs.
-
-    The runs of a block wait for the slowest at every step. The time at which a vane moves depends on how long the valve
-    takes to move the gas.
-    """
-    plant = run.plant
-    gas = (
-        plant.dead_volume_1 + plant.dead_volume_2 + plant.displacement_per_radian * (plant.angle_max - plant.angle_min)
-    )
-    duration = np.broadcast_to(gas / (plant.valve_conductance * plant.gas_product), (runs,))
-    return np.argsort(duration[members], kind="stable")
-
-
-def gas_at_start(run: Run) -> Any:
-    """Return the initial gas state beyond ``PlantState``, the true masses; arrays (runs,) if the run has arrays."""
-    return masses_at_start(run.initial) if run.program.is_thermal else NoParameters()
 
 
 def states_at_start(run: Run) -> list[Any]:

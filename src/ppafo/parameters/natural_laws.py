@@ -107,7 +107,7 @@ def valve_departure(model: ValveModel, settings: Any, plant: Any) -> LawDepartur
     pressure = room + 0.5 * (plant.supply_pressure - room)
     full, found = plant.valve_conductance * max(plant.supply_pressure, room), [LawDeparture(0.0, "")]
     for command in _COMMANDS:
-        state, time, parts, flows = model.initial(), 0.0, 0, list[list[float]]()
+        state, time, parts, flows = model.state(), 0.0, 0, list[list[float]]()
         for step in _STEPS:
             end = time + step
             while time < end and parts < _MOST_PARTS:

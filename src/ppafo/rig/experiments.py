@@ -156,7 +156,7 @@ def _valve_map(device: Device, preset: Preset, _seed: int) -> dict[str, Floats]:
     spool, flows = -1.0, []
     for command in commands.tolist():
         spool = spool_position(spool, command, preset.values["bench.hysteresis"])
-        openings = model.instant(parameters, model.settle(parameters, model.initial(), spool, 0.0), spool)
+        openings = model.instant(parameters, model.settle(parameters, model.state(), spool, 0.0), spool)
         forward = _valve_flow(device, preset, supply.pressure, ambient, openings.source_1)
         flows.append(forward - _valve_flow(device, preset, supply.dorsiflexion_pressure, ambient, openings.source_2))
     return {

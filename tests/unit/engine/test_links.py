@@ -192,5 +192,5 @@ def test_a_spring_in_equation_1_is_refused_with_the_place_where_friction_knows_i
 ) -> None:
     program = plan_run(load_scenario("step-response")).program
     monkeypatch.setattr(linking, "net_torque", sprung)
-    with pytest.raises(ProgramError, match=r"test_links\.py:\d+: net_torque subtracts 1 N m at rest, .*load_torque"):
+    with pytest.raises(ProgramError, match=r"test_links\.py:\d+: sprung subtracts 1 N m at rest, .*load_torque"):
         link_program(program, Replacements())

@@ -224,7 +224,7 @@ def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
         fault = "regulates pressures, of which there is no linear model"
     else:
         # A small change of the command changes openings or their rates somewhere; a table of openings may be flat.
-        still = dict(zip(valve_states(run.program), numbers(run.program.valve.initial()), strict=True))
+        still = dict(zip(valve_states(run.program), numbers(run.program.valve.state()), strict=True))
         plant, commands = (
             plant_of(_without_slew_limit(run), None, still | {"command": 0.0}),
             np.linspace(-0.95, 0.95, 20),

@@ -305,7 +305,7 @@ def start(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
         lane[name] = of_plant(lane.plant)
     if program.is_thermal:
         lane.masses = masses_at_start(lane.state)
-    lane.valve_state = parts.constant(program.valve.initial())
+    lane.valve_state = parts.constant(program.valve.state())
     if program.controller is not None:
         lane.controller_state = parts.constant(program.controller.initial)
     if program.feed is not None:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, get_type_hints
 
-from ppafo.model.declaration import Quantity, quantities_of
+from ppafo.model.declaration import PlainFunction, Quantity, quantities_of
 from ppafo.model.orifice import FlowCurve
 from ppafo.model.plant import Openings, PlantParameters, PortFlow, PortSlopes
 
@@ -26,10 +26,9 @@ class ValveModel:
     """Functions of a valve for the time stepping and for the reference solver.
 
     ``parameters`` and ``state`` are NamedTuple classes of floats. ``prepare(settings)`` makes the parameters from the
-    declared settings; ``initial()`` makes the state, and is the class itself if its fields have defaults.
-    ``advance(parameters, state, command, time, step)`` returns the valve output during the step, and the next state.
-    ``shown`` is the class of the output, a float or a NamedTuple; ``connect(plant, shown)`` converts the output to
-    ports of the class ``port``; ``port_flow`` is the flow through that kind of port.
+    declared settings; a run begins with the defaults of the state. ``advance(parameters, state, command, time, step)``
+    returns the valve output during the step, and the next state. ``connect(plant, shown)`` converts the output, of the
+    class with which ``shown`` is annotated, to the ports of both chambers; ``port_flow`` is the flow through one.
     ``jumps`` is True for a valve that switches by itself within a step, as given by ``next_event`` and ``settle``: the
     step is then divided at the switching times. ``shift(state, next_state)`` is the relative change of the opening of a
     valve that moves within a step, None for a valve that stands still between two switchings.
@@ -49,11 +48,8 @@ class ValveModel:
     parameters: type
     state: type
     prepare: Callable[[Any], Any]
-    initial: Callable[[], Any]
-    shown: type
-    port: type
     advance: Callable[[Any, Any, float, float, float], tuple[Any, Any]]
-    connect: Callable[[PlantParameters, Any], tuple[Any, Any]]
+    connect: PlainFunction
     port_flow: Callable[[float, Any, FlowCurve], tuple[PortFlow, PortSlopes]]
     jumps: bool
     shift: Callable[[Any, Any], float] | None
@@ -70,22 +66,10 @@ class ValveModel:
         """True for a valve whose command is a set pressure: its openings follow the pressures in the chambers."""
         return self.command_for is not None
 
-
-def valve_problem(valve: ValveModel) -> str:
-    """Describe a contradiction between a valve and its ``connect`` function in the output or the ports; else empty."""
-    hints = list(get_type_hints(valve.connect).values())
-    if len(hints) != 3:
-        ports = f"tuple[{_name(valve.port)}, {_name(valve.port)}]"
-        return f"{valve.connect.__name__}(plant, shown) must be annotated with {_name(valve.shown)} and {ports}"
-    if hints[1] is not Any and hints[1] is not valve.shown:
-        return f"{valve.connect.__name__} takes a {_name(hints[1])}, but the valve shows a {_name(valve.shown)}"
-    if hints[2] != tuple[valve.port, valve.port]:  # type: ignore[name-defined]
-        return f"{valve.connect.__name__} returns {_name(hints[2])}, but the valve has ports {_name(valve.port)}"
-    return ""
-
-
-def _name(kind: Any) -> str:
-    return getattr(kind, "__name__", str(kind)) if isinstance(kind, type) else str(kind)
+    @property
+    def shown(self) -> Any:
+        """Class of the output, a float or a NamedTuple, as ``connect`` takes it; None if that is not annotated."""
+        return get_type_hints(self.connect).get(self.connect.__code__.co_varnames[1])
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,9 +11,7 @@ from typing import Annotated, NamedTuple
 from ppafo.model.declaration import Number
 from ppafo.model.elementary import DOUBLINGS, SMALLEST_FRACTION, TERMS
 from ppafo.model.plant import (
-    BlendedPort,
     Openings,
-    SinglePort,
     blended_port_flow,
     blended_ports,
     openings_of,
@@ -290,9 +288,6 @@ IDEAL = ValveModel(
     parameters=IdealProportional,
     state=NoValveState,
     prepare=prepare_ideal,
-    initial=NoValveState,
-    shown=float,
-    port=SinglePort,
     advance=advance_ideal,
     connect=single_ports,
     port_flow=single_port_flow,
@@ -309,9 +304,6 @@ MOVING = ValveModel(
     parameters=MovingProportional,
     state=SpoolState,
     prepare=prepare_moving,
-    initial=SpoolState,
-    shown=Openings,
-    port=BlendedPort,
     advance=advance_moving,
     connect=blended_ports,
     port_flow=blended_port_flow,

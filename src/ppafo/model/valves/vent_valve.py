@@ -102,7 +102,6 @@ def settle_moving(valve: MovingProportional, state: SpoolState, command: float, 
 
 IDEAL = replace(
     proportional.IDEAL,
-    shown=VentedOpening,
     advance=advance_ideal,
     connect=connect_ideal,
     instant=instant_ideal,
