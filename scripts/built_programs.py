@@ -5,14 +5,15 @@ from pathlib import Path
 from types import ModuleType
 
 from ppafo.engine.compilers import FLAGS
-from ppafo.engine.lane_rows import COMPILED, lanes_of
+from ppafo.engine.entries import entry_text
+from ppafo.engine.lane_rows import LOOP, lanes_of
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, join_results
 from ppafo.translation.compiling import compile_library
 from ppafo.translation.native import LIBRARY_FILE
 from ppafo.translation.native_entries import Parameters, fill_module, parameters_of
 from ppafo.translation.native_source import with_packed_entries
 
-_LANE_LOOP = parameters_of(f"{COMPILED}\ndef advance(")
+_LANE_LOOP = parameters_of(entry_text("advance", LOOP, ()))
 
 
 def build(

@@ -15,7 +15,7 @@ import importlib
 from functools import partial
 from typing import Any
 
-from ppafo.engine.compilers import Compiler, offer
+from ppafo.engine.compilers import OFFERED, Compiler
 from ppafo.version import __version__ as __version__
 
 _HOMES = {
@@ -85,7 +85,7 @@ def _compiler_of_c(name: str) -> Compiler:
 
 
 # By name, as the engine knows nothing of the translation above it. A slow valve takes four times as long by clang.
-offer({name: partial(_compiler_of_c, name) for name in ("gcc", "clang", "zig")})
+OFFERED.update({name: partial(_compiler_of_c, name) for name in ("gcc", "clang", "zig")})
 
 
 def __getattr__(name: str) -> Any:

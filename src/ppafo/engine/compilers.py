@@ -4,7 +4,7 @@ The engine generates the text of a program and knows no language other than Pyth
 other packages, which register them when the package is imported.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from enum import StrEnum
 from types import ModuleType
 from typing import Protocol
@@ -71,8 +71,3 @@ class Compiler(Protocol):
 
 OFFERED: dict[str, Callable[[], Compiler]] = {}
 """Registered compilers by name, preferred first; each raises SimulationError if it is missing on this computer."""
-
-
-def offer(compilers: Mapping[str, Callable[[], Compiler]]) -> None:
-    """Register compilers in order of preference, each as a function that creates the compiler when first needed."""
-    OFFERED.update(compilers)

@@ -9,10 +9,9 @@ import functools
 import inspect
 import math
 import types
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
 from types import FunctionType
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -47,39 +46,11 @@ def is_step_function(function: object) -> bool:
     return isinstance(function, FunctionType) and function.__code__.co_varnames[:1] == ("parts",)
 
 
-@dataclass(frozen=True, slots=True)
-class FunctionNames:
-    """Names of a function: local names and parameters, known values by name, and row classes by name."""
-
-    local: frozenset[str]
-    parameters: frozenset[str]
-    known: Mapping[str, Any]
-    rows: Mapping[str, Any]
-
-
-def names_of(function: FunctionType) -> FunctionNames:
-    """Return the names in a model function; ``parts``, if bound to the function, is a known value."""
-    parts = parts_of(function)
-    known = {} if parts is None else {"parts": parts}
-    local, parameters = frozenset(function.__code__.co_varnames), frozenset(_parameters(function.__code__))
-    return FunctionNames(local, parameters, known, {})
-
-
-class ModuleText(Protocol):
-    """Text of the module for which a function is composed."""
-
-    def handed_to(self, name: str) -> tuple[str, ...]:
-        """Return the effect parameters and states that a generated function takes as leading arguments."""
-
-    def constructed(self, row: Any) -> Any:
-        """Return the class that replaces a declared NamedTuple class in this module."""
-
-    def note_read(self, scope: Mapping[str, Any], name: str, value: Any) -> None:
-        """Record an outside name and its value, on which the generated text depends."""
-
-
 class Composer(ast.NodeTransformer):
     """Rewriter of the body of one function; ``add_inside`` adds what the function uses to the module.
+
+    ``local`` are its names, ``known`` the values of some names, and ``rows`` classes of rows by name. By default they
+    are those of a function of the model, in which ``parts`` are a known value if they are bound to it.
 
     ``rows_to_receive`` are rows that called functions need and for which this function has no parameter, so that its
     callers have to pass them.
@@ -88,12 +59,21 @@ class Composer(ast.NodeTransformer):
     def __init__(
         self,
         function: FunctionType,
-        module: ModuleText,
-        names: FunctionNames,
+        module: Any,  # a ``SourceCollector``
         add_inside: Callable[[FunctionType, Any], str],
+        local: Iterable[str] | None = None,
+        known: Mapping[str, Any] | None = None,
+        rows: Mapping[str, Any] | None = None,
     ) -> None:
         self.function, self.module, self.add_inside = function, module, add_inside
-        self.local, self.parameters, self.known, self.rows = names.local, names.parameters, names.known, names.rows
+        names = function.__code__.co_varnames
+        self.local = frozenset(names if local is None else local)
+        self.parameters = frozenset(_parameters(function.__code__)) if local is None else self.local
+        self.rows = rows or {}
+        if known is None:
+            parts = parts_of(function)
+            known = {} if parts is None else {"parts": parts}
+        self.known = known
         self.kinds: dict[str, Any] = {**function.__annotations__, **self.rows}
         self.rows_to_receive: set[str] = set()
 

@@ -28,11 +28,7 @@ def check_is_plain(function: Any) -> None:
     """Refuse all but plain functions, whose source text is the code that Python runs. ProgramError states why."""
     name = getattr(function, "__qualname__", None) or repr(function)
     if type(function) is not FunctionType:
-        if not callable(function):
-            raise ProgramError(f"cannot compile {name}: it is not a function")
-        if type(function).__module__ == "builtins" and type(function).__name__ == "builtin_function_or_method":
-            raise ProgramError(f"cannot compile {name}: its source text is not available; define it in a .py file")
-        raise ProgramError(f"cannot compile {name}: it must be a plain function defined with 'def'")
+        raise ProgramError(f"cannot compile {name}: it must be a plain function defined with 'def' in a .py file")
     if hasattr(function, "__wrapped__"):
         raise ProgramError(
             f"{place_of(function)}: '{name}' is wrapped by a decorator, which cannot be compiled; remove the decorator"
@@ -62,14 +58,11 @@ def parse_definition(function: FunctionType, adapt: Adaptation | None = None) ->
     try:
         text = _source_text(function, code)
     except (OSError, TypeError) as error:
-        reason = f"its source text is not available ({error})"
-        raise ProgramError(f"cannot compile {name}: {reason}") from error
+        raise ProgramError(f"cannot compile {name}: its source text is not available ({error})") from error
     try:
-        tree = parse_module("\n" * (code.co_firstlineno - 1) + text).body[0]
-    except SyntaxError as error:
-        raise refusal(
-            file, code.co_firstlineno, f"the source text of '{name}' is not a complete function definition"
-        ) from error
+        tree: ast.stmt | None = parse_module("\n" * (code.co_firstlineno - 1) + text).body[0]
+    except SyntaxError:
+        tree = None
     if not isinstance(tree, ast.FunctionDef) or tree.name != code.co_name:
         raise refusal(file, code.co_firstlineno, f"'{name}' must be a plain function defined with 'def'")
     if tree.decorator_list:

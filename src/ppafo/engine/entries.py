@@ -7,16 +7,16 @@ called by entries. Every compiler reads the decorators; for Python itself they d
 import ast
 import threading
 from collections.abc import Callable, Iterable, Mapping
-from functools import partial
+from copy import deepcopy
 from itertools import pairwise
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, TypeVar
 
 PARSING = threading.RLock()
 """Lock for creating syntax trees: Python 3.11 has one recursion depth for the trees of all threads, and raises
 SystemError if the garbage collector lets a second thread parse before the first is done (CPython issue 106905).
 """
+
+Node = TypeVar("Node", bound=ast.AST)
 
 FLOAT, INT = "float64", "int64"
 ARRAY = "float64[::1]"
@@ -38,15 +38,6 @@ ORIGIN = "# origin"
 _MARK = "@entry("
 
 
-def with_arrays(entry: Callable[..., None], *arrays: NDArray[np.float64]) -> Callable[..., None]:
-    """Return an entry of a loaded module as a function of its numbers alone, bound to the leading array arguments.
-
-    A call then costs as much as a call with a few numbers.
-    """
-    packed: Callable[..., Callable[..., None]] | None = getattr(entry, "with_arrays", None)
-    return partial(entry, *arrays) if packed is None else packed(*arrays)
-
-
 def entry_text(name: str, parameters: Mapping[str, str], lines: Iterable[str]) -> str:
     """Return the text of an entry, from its parameter types in order and the lines of its body."""
     head = ENTRY.format(", ".join(parameters.values()))
@@ -62,6 +53,23 @@ def parse_expression(text: str) -> ast.expr:
     """Return the syntax tree of an expression; only one thread parses at a time."""
     with PARSING:
         return ast.parse(text, mode="eval").body
+
+
+class _Rewriting(ast.NodeTransformer):
+    """Transformer that replaces each expression for which ``made`` returns another, the outermost first."""
+
+    def __init__(self, made: Callable[[ast.expr], ast.expr | None]) -> None:
+        self.made = made
+
+    def visit(self, node: ast.AST) -> Any:
+        found = self.made(node) if isinstance(node, ast.expr) else None
+        return self.generic_visit(node) if found is None else found
+
+
+def rewritten(node: Node, made: Callable[[ast.expr], ast.expr | None]) -> Node:
+    """Return a copy of a syntax tree with each expression replaced for which ``made`` returns another."""
+    tree: Node = _Rewriting(made).visit(deepcopy(node))
+    return tree
 
 
 def entry_types(source: str) -> dict[str, list[str]]:

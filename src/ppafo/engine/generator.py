@@ -2,24 +2,22 @@
 
 import ast
 from collections import namedtuple
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from types import FunctionType
 from typing import Any
 
-from ppafo.engine.composer import Composer, FunctionNames, is_step_function
+from ppafo.engine.composer import Composer, is_step_function
 from ppafo.engine.definitions import emitted_name
 from ppafo.engine.linking import link_program
-from ppafo.engine.plain_python import check_flow, check_grammar, place, refusal
+from ppafo.engine.plain_python import check_flow, check_grammar, refusal, stored_names
 from ppafo.engine.program import Program
 from ppafo.engine.reduction import (
     HISTORIES,
     NUMBER,
     Effects,
     Reduction,
-    StepModule,
     definition_of,
-    names_in,
     uses_of_group,
 )
 from ppafo.engine.source_text import SourceCollector
@@ -39,10 +37,6 @@ class ComposedFunction:
     """Groups that the function reads and sets."""
     handed: tuple[str, ...]
     """Parameters before the function's own parameters: groups of a run, and the index of the run."""
-    known: Mapping[str, Any]
-    """Arguments known at composition, which are not parameters of the composed function."""
-    is_phase: bool
-    """True if the loop over steps calls the function, false if another function of the step does."""
     ending: str
     """Suffix of the name, used if another program has a different function of the same name."""
 
@@ -72,8 +66,6 @@ class StepText:
     placeholders: dict[str, Any] = field(default_factory=dict)
     given: set[str] = field(default_factory=set)
     """Groups of intermediate values that the phases composed so far have set."""
-    module: StepModule = field(init=False, repr=False)
-    """This collection as functions of the step are reduced for it."""
 
     def __post_init__(self) -> None:
         """Look up the groups of the program, and link the functions of its components."""
@@ -81,14 +73,10 @@ class StepText:
         self.of_step = self.parts.step_rows()
         self.rows = {**self.parameters, **self.states, **self.of_step}
         link_program(self.parts, self.collector.replacements)
-        self.module = StepModule(
-            collector=self.collector,
-            parts=self.parts,
-            rows=self.rows,
-            placeholders=self.placeholders,
-            effects_of=lambda called: self.composed[called].effects,
-            add_called=self.add_called,
-        )
+
+    def effects_of(self, function: FunctionType) -> Effects:
+        """Return the groups that an added function of the step reads and sets."""
+        return self.composed[function].effects
 
     def phase(self, function: PlainFunction) -> ComposedFunction:
         """Add a function called by the loop over steps; the function returns the groups that later phases may read.
@@ -96,62 +84,40 @@ class StepText:
         Raises ProgramError if the function reads a group that no earlier phase has stored.
         """
         assert isinstance(function, FunctionType), "it is no other callable"
-        phase = self._composed(function, {}, is_phase=True)
+        phase = self._composed(function, is_phase=True)
         for name in phase.handed:
             if name not in self.rows and name not in (NUMBER, *HISTORIES):
-                raise self.refuse_unkept(name, phase)
+                raise self.refuse_read(name, phase)
         # Where a loop of one run has whole steps too, phases that divide a step are written out of their order.
         for name in phase.effects.reads if not self.ending else ():
             if name in self.of_step and name not in self.given:
-                raise self.refuse_unset(name, phase)
+                raise self.refuse_read(name, phase)
         self.given.update(phase.effects.groups)
         return phase
 
-    def add_called(self, inside: FunctionType, called: FunctionType, known: Mapping[str, Any]) -> str:
-        """Add a function called by another function, with its known arguments; return its name in the module."""
+    def add_called(self, inside: FunctionType, called: FunctionType) -> str:
+        """Add a function called by another function; return its name in the module."""
         if is_step_function(called):
-            return self._composed(called, known, is_phase=False).name
+            return self._composed(called, is_phase=False).name
         return self.collector.add_inside(inside, called)
 
     def add_inside(self, function: FunctionType, called: Any) -> str:
         """Add a function called inside another, unless it is a composed step; return its name in the module."""
         return self.composed[called].name if called in self.composed else self.collector.add_inside(function, called)
 
-    def refuse_unkept(self, name: str, asking: ComposedFunction) -> ProgramError:
-        """Return the error for a phase that reads a group which no phase stores: the line, and the remedy."""
+    def refuse_read(self, name: str, asking: ComposedFunction) -> ProgramError:
+        """Return the error for a phase that reads a group which no phase before it sets: the line, and the remedy."""
         known = [function for function, composed in self.composed.items() if name in composed.effects.reads]
-        reads = ((item, node) for item in [asking.function, *known] for node in uses_of_group(item, name, ast.Load))
+        reads = ((item, node) for item in [asking.function, *known] for node in uses_of_group(item, name))
         # A phase that only sets the group must be handed what it was before.
         function, node = next(reads, (asking.function, definition_of(asking.function).tree))
-        sets = [
-            place(item.__code__.co_filename, found.lineno)
-            for item in self.composed
-            for found in uses_of_group(item, name, ast.Store)
-        ]
-        if not sets:
-            hint = nearest_name(name, self.rows)
-            problem = f"'lane.{name}' is not set by an earlier phase and is not a group of any component{hint}"
-        else:
-            problem = (
-                f"'lane.{name}', set at {sets[0]}, is local to that phase; to pass it on, add "
-                f"'{name}': handed(CLASS) to the groups of a component (CLASS: float or a NamedTuple)"
-            )
-        return refusal(function.__code__.co_filename, node, problem)
-
-    def refuse_unset(self, name: str, asking: ComposedFunction) -> ProgramError:
-        """Return the error for a phase that reads a group of the step which is not set on every path before."""
-        uses = (
-            (function, node)
-            for use, functions in ((ast.Load, [asking.function]), (ast.Store, self.composed))
-            for function in functions
-            for node in uses_of_group(function, name, use)
-        )
-        function, node = next(uses, (asking.function, definition_of(asking.function).tree))
         problem = (
-            f"'lane.{name}' may be unset here: no phase before '{asking.function.__name__}' sets it; "
-            "set it earlier, on every path"
+            f"may be unset here: no phase before '{asking.function.__name__}' sets it; set it earlier, on every path"
         )
-        return refusal(function.__code__.co_filename, node, problem)
+        if name not in self.rows:
+            hint = nearest_name(name, self.rows) or f"; declare it: '{name}': handed(CLASS), of float or a NamedTuple"
+            problem = f"is not handed on by an earlier phase and is not a group of any component{hint}"
+        return refusal(function.__code__.co_filename, node, f"'lane.{name}' {problem}")
 
     def joined(self, functions: Sequence[PlainFunction], parts: Any, takes: Sequence[str]) -> list[ast.stmt]:
         """Return the statements of several functions, concatenated into one function with the parameters ``takes``.
@@ -159,30 +125,24 @@ class StepText:
         Groups of these functions become names. Their ``parts`` are other parts than the parts of the step.
         """
         plain = [function for function in functions if isinstance(function, FunctionType)]
-        reduced = [(function, Reduction(self.module, function, {"parts": parts}).reduced()) for function in plain]
-        local = {name.id for _, tree in reduced for name in names_in(tree) if isinstance(name.ctx, ast.Store)}
+        reduced = [(function, Reduction(self, function, parts).reduced()) for function in plain]
+        local = stored_names(tree for _, tree in reduced)
         found: list[ast.stmt] = []
         for function, tree in reduced:
             check_grammar(tree, function.__code__.co_filename)
-            names = frozenset([*local, *takes])
-            function_names = FunctionNames(names, names, self.placeholders, {})
-            composer = Composer(function, self.collector, function_names, self.add_inside)
+            names = [*local, *takes]
+            composer = Composer(function, self.collector, self.add_inside, names, self.placeholders)
             found += [composer.visit(statement) for statement in tree.body]
         return found
 
-    def _composed(self, function: FunctionType, known: Mapping[str, Any], is_phase: bool) -> ComposedFunction:
+    def _composed(self, function: FunctionType, is_phase: bool) -> ComposedFunction:
         """Compose a function of the step once; the reduced function returns the groups that it sets.
 
-        Raises ProgramError if the function is called in two forms, or both returns a value and sets groups.
+        Raises ProgramError if the function both returns a value and sets groups.
         """
         if function in self.composed:
-            composed = self.composed[function]
-            if composed.known != known or composed.is_phase != is_phase:
-                raise ProgramError(
-                    f"phase '{function.__name__}' is called with different 'parts' in one step; use the same 'parts'"
-                )
-            return composed
-        reduction = Reduction(self.module, function, known)
+            return self.composed[function]
+        reduction = Reduction(self, function)
         tree, effects = reduction.reduced(), reduction.effects
         if is_phase:
             # A group without rows lives in this phase alone.
@@ -206,8 +166,6 @@ class StepText:
             name=self._written(function, tree, handed, {*effects.reads, *effects.groups}),
             effects=effects,
             handed=handed,
-            known=known,
-            is_phase=is_phase,
             ending=self.ending,
         )
         return self.composed[function]
@@ -217,14 +175,11 @@ class StepText:
         file = function.__code__.co_filename
         ast.fix_missing_locations(tree)
         check_grammar(tree, file)
-        local = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
-        local |= {argument.arg for argument in tree.args.args}
+        local = stored_names([tree]) | {argument.arg for argument in tree.args.args}
         check_flow(tree, file, local)
         # A local name may be that of a group which this function does not ask for.
         rows = {name: kind for name, kind in self.rows.items() if name in groups}
-        names = frozenset(local)
-        function_names = FunctionNames(names, names, self.placeholders, rows)
-        composer = Composer(function, self.collector, function_names, self.add_inside)
+        composer = Composer(function, self.collector, self.add_inside, local, self.placeholders, rows)
         tree.returns, tree.decorator_list = None, []
         tree.body = [composer.visit(statement) for statement in tree.body]
         ast.fix_missing_locations(tree)

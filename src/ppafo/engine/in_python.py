@@ -14,10 +14,9 @@ import math
 import operator
 import sys
 import textwrap
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
 from functools import lru_cache, partial
-from itertools import repeat
 from types import CodeType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any, NamedTuple, Protocol
 
@@ -27,10 +26,11 @@ from ppafo.engine.composer import COMPILED_BUILTINS
 from ppafo.engine.linking import link_program
 from ppafo.engine.plain_python import parse_module
 from ppafo.engine.program import Program
-from ppafo.engine.rows import leaves, rebuilt
+from ppafo.engine.rows import one_by_one
 from ppafo.engine.source_text import MadeFrom, NameRead, Replacements
 from ppafo.errors import ProgramError
 from ppafo.model.binding import is_made_of
+from ppafo.model.columns import gather
 from ppafo.model.declaration import PlainFunction
 
 OWN = "ppafo."
@@ -243,49 +243,19 @@ def _copied(program: Program, function: PlainFunction) -> Any:
 
 def _over_samples(make: Callable[[Operations | None], PlainFunction], arguments: Sequence[Any]) -> Any:
     """Evaluate the function that ``make`` builds for given operations, for arrays (samples,) of arguments."""
-    sizes = {column.size for argument in arguments for column in _columns_of(argument)}
-    if not sizes:
-        return make(None)(*arguments)
-    (size,) = sizes
+    alone, numbers = one_by_one(make(None), arguments)
+    if not numbers:
+        return alone()
     with contextlib.suppress(ProgramError), np.errstate(all="ignore"):
         # A choice works out what no sample takes, too.
         return make(COLUMNS)(*arguments)
+    samples = [column.tolist() for column in np.broadcast_arrays(*numbers)]
     try:
-        return _stacked(list(map(make(None), *(_samples_of(argument, size) for argument in arguments))))
+        results = list(map(alone, *samples))
     except (ArithmeticError, ValueError):
         # A run that diverged has numbers of which Python would make none.
-        return _stacked(list(map(make(WITHOUT_EXCEPTIONS), *(_samples_of(argument, size) for argument in arguments))))
-
-
-def _columns_of(argument: Any) -> list[Any]:
-    """Return all columns in an argument."""
-    if isinstance(argument, Mapping):
-        return [column for row in argument.values() for column in _columns_of(row)]
-    values = leaves(argument) if isinstance(argument, tuple) else [argument]
-    return [value for value in values if isinstance(value, np.ndarray) and value.ndim]
-
-
-def _samples_of(argument: Any, size: int) -> Iterable[Any]:
-    """Return an argument at each of ``size`` samples."""
-    if not _columns_of(argument):
-        return repeat(argument, size)
-    if isinstance(argument, Mapping):
-        rows = zip(*(_samples_of(row, size) for row in argument.values()), strict=True)
-        return (dict(zip(argument, at, strict=True)) for at in rows)
-    if not isinstance(argument, tuple):
-        column: list[float] = argument.tolist()
-        return column
-    numbers = zip(*(_samples_of(value, size) for value in leaves(argument)), strict=True)
-    return (rebuilt(type(argument), values) for values in numbers)
-
-
-def _stacked(results: list[Any]) -> Any:
-    """Stack the results of all samples into arrays (samples,), nested as each single result."""
-    first = results[0]
-    if not isinstance(first, tuple):
-        return np.array(results, dtype=np.float64)
-    columns = [_stacked(list(items)) for items in zip(*results, strict=True)]
-    return type(first)(*columns) if hasattr(first, "_fields") else tuple(columns)
+        results = list(map(one_by_one(make(WITHOUT_EXCEPTIONS), arguments)[0], *samples))
+    return gather(results, np.arange(len(results)))
 
 
 def _chosen(test: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:

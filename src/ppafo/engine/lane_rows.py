@@ -2,20 +2,20 @@
 
 from functools import lru_cache
 
-from ppafo.engine.entries import ENTRY
+from ppafo.engine.entries import FLOAT, INT
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths
 
-COMPILED = ENTRY.format(
-    "float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, :, ::1], "
-    "float64[:, :, ::1], int64, int64, int64, int64, float64, int64, int64, int64, int64, int64"
-)
-"""Decorator of a loop, with the types of its ``ARGUMENTS``."""
-ARGUMENTS = (
-    "states, parameters, signal_history, command_history, record, trace, "
-    "first_step, step_count, steps_in_all, steps_per_sample, interval, last_record, next_record, trace_every, "
-    "signal_delay, command_delay"
-)
+LOOP = {
+    **dict.fromkeys(("states", "parameters"), "float64[:, ::1]"),
+    "signal_history": "float64[:, :, ::1]",
+    "command_history": "float64[:, ::1]",
+    **dict.fromkeys(("record", "trace"), "float64[:, :, ::1]"),
+    **dict.fromkeys(("first_step", "step_count", "steps_in_all", "steps_per_sample"), INT),
+    "interval": FLOAT,
+    **dict.fromkeys(("last_record", "next_record", "trace_every", "signal_delay", "command_delay"), INT),
+}
+"""Arguments of a loop in order, with their types."""
 
 LANES = 32
 """Largest number of runs in a block."""

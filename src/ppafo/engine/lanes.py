@@ -212,7 +212,7 @@ def run_blocks(
     yet compiled.
     """
     module = load_program(batch.program, effort)
-    runs = batch.states.shape[1]
+    runs: int = batch.states.shape[1]
     lanes = lanes_of(batch.program)
     starts = range(0, runs, lanes)
     workers = 1 if len(starts) == 1 else min(len(starts), threads or os.cpu_count() or 1)
@@ -223,48 +223,40 @@ def run_blocks(
             slow = "ppafo: Python runs these models in about %s; compiled models take seconds: %s"
             logger.warning(slow, time_text(seconds), HOW_TO_INSTALL)
 
-    # One iterator for all threads: a range iterator hands each start to one of them.
-    waiting = iter(starts)
-    stop = threading.Event()
-    ended: list[int] = []
+    steps, stop = batch.clock.step_count, threading.Event()
 
-    def work() -> None:
-        steps = batch.clock.step_count
-        for start in waiting:
-            members = slice(start, min(start + lanes, runs))
-            parameters, states = batch.parameters[:, members], batch.states[:, members]
-            block = LaneBlock(module, batch.program, batch.clock, parameters, states)
-            for first_step in range(0, steps, STEPS_PER_CALL):
-                if stop.is_set():
-                    return
-                # An interrupt is seen between two calls only: compiled code cannot be stopped.
-                interrupts.check()
-                block.advance(min(STEPS_PER_CALL, steps - first_step))
+    def run(start: int) -> int:
+        """Run a block to its end, unless another one failed; return the number of runs that have ended."""
+        end = min(start + lanes, runs)
+        members = slice(start, end)
+        parameters, states = batch.parameters[:, members], batch.states[:, members]
+        block = LaneBlock(module, batch.program, batch.clock, parameters, states)
+        for first_step in range(0, steps, STEPS_PER_CALL):
             if stop.is_set():
-                return
-            take(members, block.result())
-            ended.append(members.stop - members.start)
-            if workers == 1:
-                count(ended.pop())
+                return 0
+            # An interrupt is seen between two calls only: compiled code cannot be stopped.
+            interrupts.check()
+            block.advance(min(STEPS_PER_CALL, steps - first_step))
+        take(members, block.result())
+        return end - start
 
-    # One block needs no pool of threads, and an interrupt reaches it at once.
+    # One worker needs no pool of threads, and an interrupt reaches it at once.
     if workers == 1:
-        work()
+        for start in starts:
+            count(run(start))
         return
-    from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
+    from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 
     with ThreadPoolExecutor(workers) as pool:
         try:
-            working = [pool.submit(work) for _ in range(workers)]
-            is_busy = True
-            while is_busy:
-                is_busy = bool(wait(working, _BETWEEN_COUNTS, FIRST_EXCEPTION).not_done)
-                # The error of one worker is raised at once, and ends the others.
-                for worker in filter(Future.done, working):
-                    worker.result()
-                count(sum(ended.pop() for _ in range(len(ended))))
+            left = {pool.submit(run, start) for start in starts}
+            while left:
+                done, left = wait(left, _BETWEEN_COUNTS, FIRST_EXCEPTION)
+                # The error of one block is raised at once, and ends the others.
+                count(sum(block.result() for block in done))
         finally:
             stop.set()
+            pool.shutdown(cancel_futures=True)
 
 
 def join_results(results: Sequence[BatchResult]) -> BatchResult:
@@ -312,7 +304,7 @@ class LaneBlock:
         interval = float(clock.record_every or clock.measure_every)
         # Samples before this step are taken; one that lies on it to rounding is still to come.
         taken = math.ceil((self._next_step - SAME_MOMENT) / interval) if interval else 0
-        # In the order of ``lane_rows.ARGUMENTS``: compiled code takes no names.
+        # In the order of ``lane_rows.LOOP``: compiled code takes no names.
         self._module.advance(
             self.states,
             self._parameters,

@@ -6,13 +6,12 @@ all runs, and each function of ``lanes``.
 
 import ast
 from collections.abc import Iterable, Mapping, Sequence
-from copy import deepcopy
 from typing import NamedTuple, TypeAlias
 
-from ppafo.engine.entries import indent, parse_expression
+from ppafo.engine.entries import indent, parse_expression, rewritten
 from ppafo.engine.generator import ComposedFunction, StepText
 from ppafo.engine.lane_rows import HANDED, lanes_of
-from ppafo.engine.reduction import NUMBER, TRACE, Slot, group_of_name, with_arguments
+from ppafo.engine.reduction import NUMBER, TRACE, Slot, with_arguments
 from ppafo.engine.rows import leaf_paths, row_expression, row_numbers
 
 
@@ -90,14 +89,10 @@ class RowsOfLanes:
                     lines.append(f"{self.cells[path]} = {call.result(group)}{path.removeprefix(group)}")
         return lines + [f"{call.stored(slot, 'lane')} = {call.result(name)}" for name, slot in effects.slots.items()]
 
-    def with_cells(self, node: ast.expr) -> ast.expr:
-        """Expression with group fields replaced by elements of ``x``."""
-        written: ast.expr = _Cells(self.cells).visit(deepcopy(node))
-        return written
-
     def any_of(self, condition: ast.expr, is_none: bool) -> tuple[list[str], str]:
         """Lines that count the runs with a condition, and the test of the count, which can be vectorised."""
-        text = ast.unparse(self.with_cells(condition))
+        cells = {f"lane.{path}": parse_expression(cell) for path, cell in self.cells.items()}
+        text = ast.unparse(rewritten(condition, lambda node: cells.get(ast.unparse(node))))
         lines = ["counted = 0", "for lane in range(width):", f"    counted += 1 if {text} else 0"]
         return lines, "counted == 0" if is_none else "counted > 0"
 
@@ -150,14 +145,10 @@ class RowsOfRun:
         kept = {name: slot for name, slot in effects.slots.items() if slot.history != TRACE}
         return lines + [f"{call.stored(slot, '0')} = {call.result(name)}" for name, slot in kept.items()]
 
-    def with_cells(self, node: ast.expr) -> ast.expr:
-        """Expression with the names of the groups."""
-        written: ast.expr = _OfRun().visit(deepcopy(node))
-        return written
-
     def any_of(self, condition: ast.expr, is_none: bool) -> tuple[list[str], str]:
         """No lines, and the condition itself: a single run needs no count of runs."""
-        text = ast.unparse(self.with_cells(condition))
+        names = {f"lane.{group}": ast.Name(group, ast.Load()) for group in self.step.rows}
+        text = ast.unparse(rewritten(condition, lambda node: names.get(ast.unparse(node))))
         return [], f"not {text}" if is_none else text
 
     def action(self, method: str, arguments: Sequence[str]) -> list[str]:  # noqa: ARG002 - as for many runs
@@ -171,35 +162,6 @@ class RowsOfRun:
 
 Rows: TypeAlias = RowsOfLanes | RowsOfRun
 """Storage of the numbers of a step, as used by the generator of the loop."""
-
-
-class _Cells(ast.NodeTransformer):
-    """Transformer that replaces ``lane.GROUP.FIELD`` by the storage of the number."""
-
-    def __init__(self, cells: Mapping[str, str]) -> None:
-        self.cells = cells
-
-    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        root: ast.expr = node
-        while isinstance(root, ast.Attribute):
-            root = root.value
-        group = group_of_name(root)
-        path = ast.unparse(node).removeprefix(f"{ast.unparse(root)}.")
-        path = f"{group}.{path}" if group else path
-        return parse_expression(self.cells[path]) if path in self.cells else node
-
-
-class _OfRun(ast.NodeTransformer):
-    """Transformer that replaces ``lane.GROUP`` by the name of the group."""
-
-    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        if isinstance(node.value, ast.Name) and node.value.id == "lane":
-            return ast.Name(node.attr, ast.Load())
-        self.generic_visit(node)
-        return node
-
-    def visit_Name(self, node: ast.Name) -> ast.expr:
-        return ast.Name(group_of_name(node) or node.id, node.ctx)
 
 
 def over_rows(count: int, line: str) -> list[str]:

@@ -9,15 +9,15 @@ import ast
 from collections.abc import Callable, Mapping, Sequence
 from types import FunctionType
 
-from ppafo.engine.composer import Composer, FunctionNames
-from ppafo.engine.entries import HEADER, indent, parse_expression
+from ppafo.engine.composer import Composer
+from ppafo.engine.entries import HEADER, entry_text, indent, parse_expression, rewritten
 from ppafo.engine.generator import StepText
-from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, VECTOR
+from ppafo.engine.lane_rows import LOOP, VECTOR
 from ppafo.engine.loop_rows import Call, Rows, RowsOfLanes, RowsOfRun, over_rows
 from ppafo.engine.plain_python import parse_module
 from ppafo.engine.program import Program
 from ppafo.engine.reduction import HISTORIES, Reduction
-from ppafo.engine.rows import leaf_paths
+from ppafo.engine.rows import given, taken
 from ppafo.engine.source_text import SourceCollector
 from ppafo.engine.step import loop
 from ppafo.engine.step.lane import Now
@@ -38,10 +38,10 @@ class LoopText:
         (self.rows, self.step), *others = steps.items()
         self.steps, self.function = steps, function
         assert isinstance(function, FunctionType), "it is no other callable"
-        self.reduction = Reduction(self.step.module, function, {})
-        local = frozenset({*function.__code__.co_varnames, *HISTORIES, "record"})
-        names = FunctionNames(local, local, self.step.placeholders, {"now": Now})
-        self.composer = Composer(function, self.step.collector, names, self.step.add_inside)
+        self.reduction = Reduction(self.step, function)
+        local = (*function.__code__.co_varnames, *HISTORIES, "record")
+        known, rows = self.step.placeholders, {"now": Now}
+        self.composer = Composer(function, self.step.collector, self.step.add_inside, local, known, rows)
         self.other = LoopText(dict(others), function) if others else None
 
     def lines(self) -> list[ast.stmt]:
@@ -60,8 +60,17 @@ class LoopText:
 
     def composed(self, reduced: ast.expr) -> ast.expr:
         """Translation of a reduced expression."""
-        composed: ast.expr = self.composer.visit(_OfLanes(self.rows).visit(reduced))
+        composed: ast.expr = self.composer.visit(rewritten(reduced, self.of_lanes))
         return composed
+
+    def of_lanes(self, node: ast.expr) -> ast.expr | None:
+        """Array or expression of the module for an array or function of ``lanes``; None for any other expression."""
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and _is_lanes(node.func.value):
+            arguments = [ast.unparse(rewritten(argument, self.of_lanes)) for argument in node.args]
+            return parse_expression(self.rows.value(node.func.attr, arguments))
+        if isinstance(node, ast.Attribute) and _is_lanes(node.value):
+            return ast.Name("record" if node.attr == "records" else node.attr, ast.Load())
+        return None
 
     def block(self, statements: Sequence[ast.stmt]) -> list[ast.stmt]:
         """Translation of a block of statements."""
@@ -164,26 +173,6 @@ def _is_lanes(node: ast.expr) -> bool:
     return isinstance(node, ast.Name) and node.id == "lanes"
 
 
-class _OfLanes(ast.NodeTransformer):
-    """Transformer that replaces arrays and functions of ``lanes`` by arrays and expressions of the module."""
-
-    def __init__(self, rows: Rows) -> None:
-        self.rows = rows
-
-    def visit_Call(self, node: ast.Call) -> ast.expr:
-        if isinstance(node.func, ast.Attribute) and _is_lanes(node.func.value):
-            arguments = [ast.unparse(self.visit(argument)) for argument in node.args]
-            return parse_expression(self.rows.value(node.func.attr, arguments))
-        self.generic_visit(node)
-        return node
-
-    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        if _is_lanes(node.value):
-            return ast.Name("record" if node.attr == "records" else node.attr, ast.Load())
-        self.generic_visit(node)
-        return node
-
-
 def _parsed(lines: Sequence[str]) -> list[ast.stmt]:
     """Parse some lines into statements."""
     return parse_module("\n".join(lines)).body
@@ -194,30 +183,10 @@ def _unparsed(body: list[ast.stmt]) -> list[str]:
     return ast.unparse(ast.fix_missing_locations(ast.Module(body, []))).split("\n")
 
 
-def _lane_loop(step: StepText, lanes: int) -> str:
-    """Text of the function ``advance`` that advances a block of ``lanes`` runs, or of as many as fit if that is 0."""
-    rows = RowsOfLanes(step, lanes)
-    states, parameters = len(rows.state_at), len(rows.parameter_at)
-    lines = [
-        f"x = empty_rows({rows.count}, {rows.lanes})",
-        # A literal width lets the compiler unroll the loops of a small block.
-        f"width = {rows.lanes if rows.lanes <= VECTOR else 'states.shape[1]'}",
-        *over_rows(states, "x[row, lane] = states[row, lane]"),
-        *over_rows(parameters, f"x[{states} + row, lane] = parameters[row, lane]"),
-        *_unparsed(LoopText({rows: step}, loop.advance).lines()),
-        *over_rows(states, "states[row, lane] = x[row, lane]"),
-    ]
-    return "\n".join([COMPILED, f"def advance({ARGUMENTS}):", *indent(lines)])
-
-
-LOOP_ARRAYS = {"signal_history": 3, "command_history": 2}
-"""Arrays of a loop after states, parameters and samples, with their number of dimensions; the last extent is 1."""
-LOOP_NUMBERS = {
-    **dict.fromkeys(("first_step", "step_count", "steps_in_all", "steps_per_sample"), "int64"),
-    "interval": "float64",
-    **dict.fromkeys(("last_record", "next_record", "signal_delay", "command_delay"), "int64"),
+LOOP_OF_RUN = {
+    name: kind for name, kind in LOOP.items() if name not in ("states", "parameters", "record", "trace", "trace_every")
 }
-"""Numbers of a loop after its arrays, with their types, by their parameter names in ``step.loop.advance``."""
+"""Arguments of the loop of a run behind states, parameters and samples, with their types."""
 
 
 def run_loop(step: StepText, outputs: str, in_parts: StepText | None) -> str:
@@ -231,22 +200,27 @@ def run_loop(step: StepText, outputs: str, in_parts: StepText | None) -> str:
     if in_parts is not None:
         steps[RowsOfRun(in_parts, outputs)] = in_parts
     whole = _unparsed(LoopText(steps, loop.advance).lines())
-    # A group without numbers is not in the row of all.
-    taken = [
-        f"{name} = {f'{group}.{name}' if leaf_paths(row, name) else '()'}"
-        for group, groups in (("parameters", step.parameters), ("states", step.states))
-        for name, row in groups.items()
-    ]
-    left = [f"states.{name} = {name}" for name, row in step.states.items() if leaf_paths(row, name)]
-    arguments = ["states", "parameters", "samples", *LOOP_ARRAYS, *LOOP_NUMBERS, *([NEEDS_PARTS] if in_parts else [])]
+    groups = {"parameters": step.parameters, "states": step.states}
+    begin = [f"{name} = {taken(array, name, row)}" for array, rows in groups.items() for name, row in rows.items()]
+    arguments = ["states", "parameters", "samples", *LOOP_OF_RUN, *([NEEDS_PARTS] if in_parts else [])]
     sample = f"{outputs} = namedtuple({outputs!r}, {['time', *step.parts.traced]!r})"
-    body = [repr("What the run is made of, and where it stands."), *taken, *whole]
-    return "\n".join(
-        [sample, f"def advance({', '.join(arguments)}):", *indent([*body, repr("Where it stands now."), *left])]
-    )
+    body = [repr("What the run is made of, and where it stands."), *begin, *whole]
+    body += [repr("Where it stands now."), *given("states", step.states)]
+    return "\n".join([sample, f"def advance({', '.join(arguments)}):", *indent(body)])
 
 
 def write_lanes(program: Program, collector: SourceCollector, lanes: int = 0) -> str:
     """Source text of a program for ``lanes`` runs, 0 for as many as fit; ``collector`` then has all its inputs."""
-    advance = _lane_loop(StepText(program, collector), lanes)
-    return f"{HEADER}\n\n{collector.text()}\n\n\n{advance}\n"
+    step = StepText(program, collector)
+    rows = RowsOfLanes(step, lanes)
+    states, parameters = len(rows.state_at), len(rows.parameter_at)
+    lines = [
+        f"x = empty_rows({rows.count}, {rows.lanes})",
+        # A literal width lets the compiler unroll the loops of a small block.
+        f"width = {rows.lanes if rows.lanes <= VECTOR else 'states.shape[1]'}",
+        *over_rows(states, "x[row, lane] = states[row, lane]"),
+        *over_rows(parameters, f"x[{states} + row, lane] = parameters[row, lane]"),
+        *_unparsed(LoopText({rows: step}, loop.advance).lines()),
+        *over_rows(states, "states[row, lane] = x[row, lane]"),
+    ]
+    return f"{HEADER}\n\n{collector.text()}\n\n\n{entry_text('advance', LOOP, lines)}"

@@ -35,25 +35,10 @@ _PLAIN = (bool, int, float, str)
 
 
 class Key(NamedTuple):
-    """Inputs that determine a composed text.
+    """Inputs that determine a composed text in words, and the names that it depends on, with their values."""
 
-    Attributes:
-        described: description of the components of the program
-        files: hash of the package files that compose the text
-        values: hash of the numbers and texts defined in each loaded module of these files, by module name
-        made_from: names that the text depends on, with their values
-    """
-
-    described: str
-    files: str
-    values: Mapping[str, str]
+    words: str
     made_from: MadeFrom
-
-    @property
-    def words(self) -> str:
-        """All inputs in one text, and the Python version, because each version writes syntax trees differently."""
-        values = " ".join(self.values.values())
-        return f"{sys.version} {self.files} {values} {self.described}"
 
 
 def package_key(parts: Any, folders: tuple[str, ...] = COMPOSED) -> Key | None:
@@ -64,13 +49,12 @@ def package_key(parts: Any, folders: tuple[str, ...] = COMPOSED) -> Key | None:
     except _ElsewhereError:
         return None
     # Beside the bytes of the files: a session may have given a name another number.
-    numbers: dict[str, Any] = {}
+    numbers = hashlib.sha256()
     for read in reads:
         if not isinstance(read.value, FunctionType):
-            digest = numbers.setdefault(read.scope["__name__"], hashlib.sha256())
-            digest.update(f"{read.name} {read.value!r}\n".encode("utf-8", "surrogatepass"))
-    values = {module: digest.hexdigest()[:16] for module, digest in numbers.items()}
-    return Key(described=described, files=_hash_of_files(folders), values=values, made_from=MadeFrom(reads))
+            numbers.update(f"{read.scope['__name__']} {read.name} {read.value!r}\n".encode("utf-8", "surrogatepass"))
+    # Each version of Python writes syntax trees differently.
+    return Key(f"{sys.version} {_hash_of_files(folders)} {numbers.hexdigest()} {described}", MadeFrom(reads))
 
 
 class _ElsewhereError(Exception):

@@ -20,33 +20,6 @@ _PLAIN = {
     *(ast.Pass, ast.Expr, ast.BoolOp, ast.BinOp, ast.UnaryOp, ast.IfExp, ast.Compare, ast.Call, ast.keyword),
     *(ast.Constant, ast.Attribute, ast.Subscript, ast.Name, ast.Tuple, ast.Slice, ast.Starred),
 }
-_WORDS: dict[type[ast.AST], str] = {
-    ast.Dict: "a dictionary",
-    ast.Set: "a set",
-    ast.List: "a list",
-    ast.JoinedStr: "an f-string",
-    ast.Try: "'try'",
-    ast.With: "'with'",
-    ast.Raise: "'raise'",
-    ast.Assert: "'assert'",
-    ast.Import: "'import' in a function",
-    ast.ImportFrom: "'import' in a function",
-    ast.Global: "'global'",
-    ast.Nonlocal: "'nonlocal'",
-    ast.Delete: "'del'",
-    ast.Lambda: "a lambda",
-    ast.ClassDef: "a class in a function",
-    ast.FunctionDef: "a function in a function",
-    ast.AsyncFunctionDef: "a function in a function",
-    ast.ListComp: "a list",
-    ast.SetComp: "a set",
-    ast.DictComp: "a dictionary",
-    ast.GeneratorExp: "a generator",
-    ast.Yield: "'yield'",
-    ast.YieldFrom: "'yield'",
-    ast.NamedExpr: "':='",
-    ast.Match: "'match'",
-}
 _INSTEAD = "a law may use numbers, tuples, NamedTuples, 'math' and other plain functions"
 
 
@@ -94,15 +67,11 @@ def check_grammar(tree: ast.FunctionDef, file: str) -> None:
 
 def _problem(node: ast.AST) -> str:
     """Return the reason why a node cannot be compiled, and the remedy; empty if the node can be compiled."""
-    if type(node) not in _PLAIN:
-        word = _WORDS.get(type(node), f"'{type(node).__name__}'")
-        return f"{word} cannot be compiled; {_INSTEAD}"
-    if isinstance(node, ast.Starred) and not isinstance(node.ctx, ast.Load):
-        return f"'*' in the target of an assignment cannot be compiled; {_INSTEAD}"
-    if isinstance(node, ast.keyword) and node.arg is None:
-        return f"'**' cannot be compiled; {_INSTEAD}"
-    if isinstance(node, ast.Constant) and not isinstance(node.value, bool | int | float | None):
-        return f"a constant of type {type(node.value).__name__} cannot be compiled; {_INSTEAD}"
+    is_unpacked = isinstance(node, ast.keyword) and node.arg is None
+    is_gathered = isinstance(node, ast.Starred) and not isinstance(node.ctx, ast.Load)
+    is_text = isinstance(node, ast.Constant) and not isinstance(node.value, bool | int | float | None)
+    if type(node) not in _PLAIN or is_unpacked or is_gathered or is_text:
+        return f"'{ast.unparse(node).splitlines()[0]}' cannot be compiled; {_INSTEAD}"
     if isinstance(node, ast.Attribute | ast.Subscript) and not isinstance(node.ctx, ast.Load):
         return f"'{ast.unparse(node)}' cannot be assigned: a NamedTuple is immutable; make a new one"
     return ""
@@ -147,18 +116,14 @@ class _Flow:
             return self.after_loop(statement, bound)
         if isinstance(statement, ast.Return) and getattr(statement.value, "value", statement) is None:
             raise refusal(self.file, statement, "'return' has no value; return a value")
-        if isinstance(statement, ast.AugAssign) and _assigned_names(statement.target) - bound:
+        if isinstance(statement, ast.AugAssign) and stored_names([statement.target]) - bound:
             raise self.unbound(statement, ast.unparse(statement.target))
         value = getattr(statement, "value", None)
         if isinstance(value, ast.expr):
             self.read(value, bound)
         ends_here = isinstance(statement, ast.Return | ast.Break | ast.Continue)
         targets = statement.targets if isinstance(statement, ast.Assign) else [getattr(statement, "target", None)]
-        stored = (
-            set()
-            if value is None
-            else {name for target in targets if target is not None for name in _assigned_names(target)}
-        )
+        stored = set() if value is None else stored_names(filter(None, targets))
         return None if ends_here else bound | stored
 
     def after_loop(self, statement: ast.For | ast.While, bound: set[str]) -> set[str] | None:
@@ -166,7 +131,7 @@ class _Flow:
         if isinstance(statement, ast.For):
             self.read(statement.iter, bound)
             # The body may run not once, so that what it assigns does not count after the loop.
-            self.end_of(statement.body, bound | _assigned_names(statement.target))
+            self.end_of(statement.body, bound | stored_names([statement.target]))
             return self.end_of(statement.orelse, bound)
         self.read(statement.test, bound)
         self.end_of(statement.body, bound)
@@ -187,8 +152,10 @@ class _Flow:
         return refusal(self.file, where, f"'{name}' may be unassigned here; assign it earlier, on every path")
 
 
-def _assigned_names(target: ast.AST) -> set[str]:
-    return {inner.id for inner in ast.walk(target) if isinstance(inner, ast.Name)}
+def stored_names(trees: Iterable[ast.AST]) -> set[str]:
+    """Return the names that some statements or targets assign."""
+    names = (node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Name))
+    return {name.id for name in names if isinstance(name.ctx, ast.Store)}
 
 
 _ORIGIN = re.compile(rf"{re.escape(ORIGIN)} (?P<file>.*): (?P<lines>[\d ]+)$")

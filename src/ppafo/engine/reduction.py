@@ -11,15 +11,16 @@ import builtins
 import sys
 import types
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from copy import copy, deepcopy
+from copy import copy
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from types import CodeType, FunctionType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
-from ppafo.engine.composer import ModuleText, is_step_function
-from ppafo.engine.plain_python import parse_module, refusal
+from ppafo.engine.composer import is_step_function
+from ppafo.engine.entries import rewritten
+from ppafo.engine.plain_python import parse_module, refusal, stored_names
 from ppafo.engine.rows import component_row, is_number, is_row, members, rebuilt, section_row
 from ppafo.errors import ProgramError
 from ppafo.model.binding import made_of
@@ -36,11 +37,6 @@ _UNKNOWN = object()
 _STATEMENTS = (
     "a phase may assign names or 'lane' groups, call functions that do, branch with 'if', and loop over components"
 )
-
-
-def is_known_part(value: Any) -> bool:
-    """Return whether a value is known at composition and not a number, so that called functions know it too."""
-    return value is not _UNKNOWN and type(value) not in (bool, int, float)
 
 
 class Slot(NamedTuple):
@@ -73,24 +69,23 @@ class Effects:
         return [*self.groups, *self.slots]
 
 
-class StepModule(NamedTuple):
-    """Module of one program, for which functions of the step are reduced.
+class StepModule(Protocol):
+    """Module of one program, for which functions of the step are reduced."""
 
-    Attributes:
-        collector: text of the module
-        parts: components of the device
-        rows: classes of all groups that have rows
-        placeholders: known values in reduced functions, by their placeholder names
-        effects_of: groups that an added function of the step reads and sets
-        add_called: adds a function called by another function, with its known arguments; returns its name in the module
-    """
-
-    collector: ModuleText
     parts: Any
-    rows: Mapping[str, Any]
+    """Components of the device."""
+    collector: Any
+    """Text of the module, a ``SourceCollector``."""
+    rows: dict[str, Any]
+    """Classes of all groups that have rows."""
     placeholders: dict[str, Any]
-    effects_of: Callable[[FunctionType], Effects]
-    add_called: Callable[[FunctionType, FunctionType, Mapping[str, Any]], str]
+    """Known values in reduced functions, by their placeholder names."""
+
+    def effects_of(self, function: FunctionType) -> Effects:
+        """Return the groups that an added function of the step reads and sets."""
+
+    def add_called(self, inside: FunctionType, called: FunctionType) -> str:
+        """Add a function called by another function; return its name in the module."""
 
 
 _COMPREHENSIONS = ast.GeneratorExp | ast.ListComp | ast.SetComp | ast.DictComp
@@ -151,10 +146,10 @@ def group_of_name(node: ast.expr) -> str:
     return node.id.removeprefix(_GROUP) if isinstance(node, ast.Name) and node.id.startswith(_GROUP) else ""
 
 
-def uses_of_group(function: FunctionType, name: str, use: type[ast.expr_context]) -> list[ast.Attribute]:
-    """Return the reads or assignments of ``lane.NAME`` in a function of the step, in order."""
+def uses_of_group(function: FunctionType, name: str) -> list[ast.Attribute]:
+    """Return the reads of ``lane.NAME`` in a function of the step, in order."""
     nodes = [node for node in ast.walk(definition_of(function).tree) if isinstance(node, ast.Attribute)]
-    found = [node for node in nodes if node.attr == name and isinstance(node.ctx, use)]
+    found = [node for node in nodes if node.attr == name and isinstance(node.ctx, ast.Load)]
     return [node for node in found if isinstance(node.value, ast.Name) and node.value.id == "lane"]
 
 
@@ -169,13 +164,13 @@ def _definitions(file: str) -> dict[int, ast.FunctionDef]:
 
 
 class Reduction:
-    """Reduction of one function; ``known`` are names with known values, in addition to ``parts``."""
+    """Reduction of one function, for the ``parts`` of the step or for others."""
 
-    def __init__(self, module: StepModule, function: FunctionType, known: Mapping[str, Any]) -> None:
+    def __init__(self, module: StepModule, function: FunctionType, parts: Any = None) -> None:
         self.module, self.function = module, function
         self.definition = definition_of(function)
         self.scope: dict[str, Any] = function.__globals__
-        self.known: dict[str, Any] = {"parts": module.parts, **known}
+        self.known: dict[str, Any] = {"parts": module.parts if parts is None else parts}
         # Local names whose values exist only while the function runs; those used in a generator are cell variables.
         self.run_time_names = {*function.__code__.co_varnames, *function.__code__.co_cellvars} - self.known.keys()
         stored = [name.id for name in names_in(self.definition.tree) if isinstance(name.ctx, ast.Store)]
@@ -198,7 +193,7 @@ class Reduction:
         parameters = [name for name in self.parameters if name != "lane" and name not in self.known and name in used]
         self.effects.takes = tuple(parameters)
         # A local name that is also the name of a group gets an underscore, and a group loses its prefix.
-        respelt = {name: f"{name}_" for name in (_bound(tree.body) | set(parameters)) & groups}
+        respelt = {name: f"{name}_" for name in (stored_names(tree.body) | set(parameters)) & groups}
         for name in {name for line in tree.body for name in names_in(line)}:
             name.id = respelt.get(name.id, name.id.removeprefix(_GROUP))
         first = [NUMBER] if HISTORIES & self.effects.reads.keys() else []
@@ -385,7 +380,7 @@ class Reduction:
                 )
             return ast.Call(self.placeholder(called), arguments, [])
         if isinstance(called, FunctionType):
-            for row in self.module.collector.handed_to(self.module.add_called(self.function, called, {})):
+            for row in self.module.collector.handed_to(self.module.add_called(self.function, called)):
                 self.group_read(row)
         # Arguments that a generator makes are written out.
         arguments = [part for argument in node.args for part in self.arguments(argument)]
@@ -407,9 +402,7 @@ class Reduction:
     def step_arguments(self, called: FunctionType, node: ast.Call) -> list[ast.expr]:
         """Return the own arguments of a called function of the step, and add the function to the module."""
         own = self.arguments_by_name(called, node)[2:]
-        known = {name: self.value_of(value) for name, value in own}
-        known = {name: value for name, value in known.items() if is_known_part(value)}
-        self.module.add_called(self.function, called, known)
+        self.module.add_called(self.function, called)
         effects = self.module.effects_of(called)
         for row in effects.reads:
             self.group_read(row)
@@ -498,7 +491,7 @@ class Reduction:
         lines: list[ast.stmt] = []
         # A name first set inside the loop is spelt anew in each turn, since its values may differ in class.
         earlier = {name.id for name in names_in(self.definition.tree) if name.lineno < node.lineno}
-        own = [name for name in _bound(node.body) if name not in earlier]
+        own = [name for name in stored_names(node.body) if name not in earlier]
         for number, element in enumerate(self.items_of(node.iter)):
             targets = node.target.elts if isinstance(node.target, ast.Tuple) else [node.target]
             values = element if isinstance(node.target, ast.Tuple) else (element,)
@@ -643,17 +636,6 @@ def _indices(node: ast.Subscript) -> Sequence[ast.expr]:
     return node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
 
 
-def _bound(body: Iterable[ast.stmt]) -> set[str]:
-    """Return the names that some statements assign."""
-    return {name.id for statement in body for name in names_in(statement) if isinstance(name.ctx, ast.Store)}
-
-
 def with_arguments(expression: ast.expr, arguments: Mapping[str, ast.expr]) -> ast.expr:
     """Return an expression of a function with its parameters replaced by the caller's argument expressions."""
-
-    class _Replacing(ast.NodeTransformer):
-        def visit_Name(self, node: ast.Name) -> ast.expr:
-            return arguments.get(node.id, node)
-
-    replaced: ast.expr = _Replacing().visit(deepcopy(expression))
-    return replaced
+    return rewritten(expression, lambda node: arguments.get(node.id) if isinstance(node, ast.Name) else None)

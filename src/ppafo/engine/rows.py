@@ -4,7 +4,7 @@ A path such as ``state.angle`` or ``law.knots[3]`` names a number; nested rows a
 tuple of fixed length is declared as ``Annotated[tuple[float, ...], 16]``, of floats or of NamedTuples.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache, lru_cache
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
@@ -90,11 +90,21 @@ def row_expression(row: Any, path: str, cells: Mapping[str, str], name_of: Calla
     return f"{name_of(row)}({', '.join(parts)})" if is_row(row) else f"({', '.join(parts)},)"
 
 
+def taken(array: str, name: str, row: Any) -> str:
+    """Return source text that reads a group from a struct of groups; one without numbers is not in it."""
+    return f"{array}.{name}" if leaf_paths(row, name) else "()"
+
+
+def given(array: str, groups: Mapping[str, Any]) -> list[str]:
+    """Return lines of source text that store groups in a struct of groups."""
+    return [f"{array}.{name} = {name}" for name, row in groups.items() if leaf_paths(row, name)]
+
+
 def leaves(row: Any) -> list[Any]:
     """Return all numbers of a NamedTuple, floats or arrays (runs,), in the order of ``leaf_paths``."""
     values: list[Any] = []
-    for value in row:
-        values += leaves(value) if isinstance(value, tuple) else [value]
+    for value in row.values() if isinstance(row, Mapping) else row:
+        values += leaves(value) if isinstance(value, tuple | Mapping) else [value]
     return values
 
 
@@ -127,12 +137,32 @@ def group_of(name: str, groups: Mapping[str, type], rows: "np.ndarray[Any, np.dt
     raise KeyError(name)
 
 
-def of_each(function: Callable[..., Any], *rows: Any) -> Any:
-    """Return the result of a function of NamedTuples of floats; evaluated run by run if fields are arrays (runs,)."""
-    kinds, numbers = [type(row) for row in rows], leaves(rows)
+def of_each(function: Callable[..., Any], *arguments: Any) -> Any:
+    """Return the result of a function of numbers, rows and mappings of rows, run by run where any holds arrays (runs,).
 
-    def from_numbers(*numbers: float) -> Any:
-        rest = iter(numbers)
-        return function(*(rebuilt(kind, rest) for kind in kinds))
+    Every number of the result is then an array (runs,).
+    """
+    alone, numbers = one_by_one(function, arguments)
+    return over_runs(alone, *numbers)
 
-    return over_runs(from_numbers, *numbers)
+
+def one_by_one(function: Callable[..., Any], arguments: Sequence[Any]) -> tuple[Callable[..., Any], list[Any]]:
+    """Return a function of the numbers of those arguments that hold arrays, and these numbers, in order."""
+    varied = [any(isinstance(number, np.ndarray) and number.ndim for number in leaves([one])) for one in arguments]
+
+    def alone(*values: float) -> Any:
+        rest = iter(values)
+        pairs = zip(arguments, varied, strict=True)
+        return function(*(_refilled(one, rest) if is_varied else one for one, is_varied in pairs))
+
+    return alone, leaves([one for one, is_varied in zip(arguments, varied, strict=True) if is_varied])
+
+
+def _refilled(argument: Any, values: Iterator[float]) -> Any:
+    """Return a number, a row or a mapping of rows with its numbers replaced by the next values."""
+    if isinstance(argument, Mapping):
+        return {name: _refilled(row, values) for name, row in argument.items()}
+    if not isinstance(argument, tuple):
+        return next(values)
+    parts = [_refilled(part, values) for part in argument]
+    return type(argument)(*parts) if hasattr(argument, "_fields") else tuple(parts)

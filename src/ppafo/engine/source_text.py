@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from types import CodeType, FunctionType
 from typing import Any, Generic, NamedTuple
 
-from ppafo.engine.composer import Composer, names_of
+from ppafo.engine.composer import Composer
 from ppafo.engine.definitions import Adaptation, check_is_plain, emitted_name, parse_definition, place_of, source_lines
 from ppafo.engine.entries import ORIGIN, without_origins
 from ppafo.engine.plain_python import refusal
@@ -153,18 +153,21 @@ class SourceCollector:
         if any(known.function is function for known in self.made_from.functions):
             problem = f"'{function.__name__}' calls itself, which cannot be compiled"
             raise refusal(function.__code__.co_filename, tree, problem)
-        self.made_from.functions.append(
-            _ComposedFrom(
-                function=function,
-                code=function.__code__,
-                defaults=function.__defaults__,
-                named_defaults=dict(function.__kwdefaults__ or {}),
-            )
-        )
-        composer = Composer(function, self, names_of(function), self.add_inside)
+        named = dict(function.__kwdefaults__ or {})
+        self.made_from.functions.append(_ComposedFrom(function, function.__code__, function.__defaults__, named))
+        composer = Composer(function, self, self.add_inside)
         tree.args.kwonlyargs = [argument for argument in tree.args.kwonlyargs if argument.arg not in composer.known]
         own_rows = self.replacements.rows.get(function, ())
-        _compose_parameters(composer, tree, own_rows)
+        # Rows of effects come first in every function, so that callers can hand them over without knowing the rest.
+        tree.args.args.sort(key=lambda argument: argument.arg not in own_rows)
+        for argument in (*tree.args.posonlyargs, *tree.args.args, *tree.args.kwonlyargs):
+            argument.annotation = None
+        # The values with which Python calls the function: the text of a default may mean something else by now.
+        tree.args.defaults = [composer.literal(value, tree, "a default") for value in function.__defaults__ or ()]
+        tree.args.kw_defaults = [
+            composer.literal(named[argument.arg], tree, "a default") if argument.arg in named else None
+            for argument in tree.args.kwonlyargs
+        ]
         body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body
         tree.name, tree.returns = name, None
         tree.body = [composer.visit(statement) for statement in body]
@@ -193,23 +196,6 @@ def composed_lines(lines: Iterable[str], needs: Mapping[str, tuple[str, ...]]) -
         return list(lines)
     calls = re.compile(rf"\b({'|'.join(map(re.escape, needs))})\(")
     return [calls.sub(lambda call: f"{call[0]}{', '.join(needs[call[1]])}, ", line) for line in lines]
-
-
-def _compose_parameters(composer: Composer, tree: ast.FunctionDef, rows: tuple[str, ...]) -> None:
-    """Rewrite the parameters of a function for the module: without annotations, ``rows`` of effects first."""
-    function, arguments = composer.function, tree.args
-    if rows:
-        # In every function, so that callers can hand them over without knowing the rest.
-        arguments.args = sorted(arguments.args, key=lambda argument: argument.arg not in rows)
-    for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs):
-        argument.annotation = None
-    # The values with which Python calls the function: the text of a default may mean something else by now.
-    arguments.defaults = [composer.literal(value, tree, "a default") for value in function.__defaults__ or ()]
-    named = function.__kwdefaults__ or {}
-    arguments.kw_defaults = [
-        composer.literal(named[argument.arg], tree, "a default") if argument.arg in named else None
-        for argument in arguments.kwonlyargs
-    ]
 
 
 def _row_text(row: Any, name: str) -> str:

@@ -1,7 +1,8 @@
 """Functions of floats applied to columns: one value for each run of an ensemble.
 
 Plain arithmetic gives the same bits on floats and on arrays (runs,). Functions with branches, powers or exponentials do
-not accept arrays; here such a function is called unchanged, once for each distinct combination of values.
+not accept arrays; here such a function is called unchanged, once for each distinct combination of values. The functions
+of numbers below work elementwise on columns; in a program of one run their branches for columns are left out.
 """
 
 import math
@@ -67,31 +68,31 @@ def gather(results: Sequence[Any], combination_of_run: NDArray[np.intp] | None) 
 
 
 def root(number: Numeric) -> Numeric:
-    """Square root of a number; elementwise for a column."""
+    """Square root of a number."""
     return np.sqrt(number) if isinstance(number, np.ndarray) else math.sqrt(number)
 
 
 def larger(first: Any, second: Any) -> Any:
-    """Larger of two numbers; elementwise for columns."""
+    """Larger of two numbers."""
     if isinstance(first, np.ndarray) or isinstance(second, np.ndarray):
         return np.maximum(first, second)
     return max(first, second)
 
 
 def smaller(first: Any, second: Any) -> Any:
-    """Smaller of two numbers; elementwise for columns."""
+    """Smaller of two numbers."""
     if isinstance(first, np.ndarray) or isinstance(second, np.ndarray):
         return np.minimum(first, second)
     return min(first, second)
 
 
 def choose(test: Any, yes: Any, no: Any) -> Any:
-    """First number where a test holds, else the second; elementwise for columns."""
+    """First number where a test holds, else the second."""
     return np.where(test, yes, no) if isinstance(test, np.ndarray) else (yes if test else no)
 
 
 def truncated(number: Numeric) -> Numeric:
-    """Integer part of a number from -2^63 to 2^63, as a float; elementwise for a column."""
+    """Integer part of a number from -2^63 to 2^63, as a float."""
     return np.trunc(number) if isinstance(number, np.ndarray) else float(int(number))
 
 
@@ -104,7 +105,7 @@ def rounded_up(number: Numeric) -> Numeric:
 
 
 def whole(number: Any) -> Any:
-    """Convert a float with an integer value to int; a column to an array of integers."""
+    """Convert a float with an integer value to int."""
     return number.astype(np.int64) if isinstance(number, np.ndarray) else int(number)
 
 

@@ -20,7 +20,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
 from ppafo.translation import typed
 from ppafo.translation.c_terms import PART, CTerms, c_name, member_name
-from ppafo.translation.scopes import Scopes, scopes_of
+from ppafo.translation.scopes import Scopes
 from ppafo.translation.typed import Function, Module, Statement, Term
 from ppafo.translation.value_types import BOOL, FLOAT, Array, Items, Row, RowReference, Scalar, Type, is_empty, types_in
 from ppafo.translation.walk import walk_module
@@ -64,57 +64,42 @@ def documents_of(collector: SourceCollector) -> dict[str, str]:
     return {name: inspect.getdoc(owner) or "" for name, owner in collector.owners.items()}
 
 
-@dataclass(frozen=True, slots=True)
-class ReadableUnit:
-    """Options for a human-readable translation unit: short names, and no unused definitions.
-
-    ``names`` maps names in the module to unique short names. ``declared`` maps rows to structs that the surrounding
-    file declares. ``around`` is the text of the surrounding file. All functions are static.
-    """
-
-    names: Mapping[str, str]
-    declared: Mapping[str, str]
-    around: str
-
-
 def c_source(
     module: Module,
     documents: Mapping[str, str],
     title: str,
     prelude: str = "prelude.h",
-    reading: ReadableUnit | None = None,
+    names: Mapping[str, str] | None = None,
+    declared: Mapping[str, str] | None = None,
+    around: str | None = None,
 ) -> str:
-    """Return the C translation unit of a module; with ``reading``, in short human-readable form.
+    """Return the C translation unit of a module.
 
     ``documents`` has the docstrings of rows and functions. ``prelude`` is the name of the file that precedes all
-    functions.
+    functions. ``names`` maps names in the module to unique short names, ``declared`` rows to structs that the text
+    ``around`` declares; in such a text all functions are static, and what it does not use of the prelude is left out.
     """
     # A function that returns only empty rows is never called: an empty value is not written.
     functions = [function for function in module if function.returns is None or not is_empty(function.returns)]
-    names: dict[str, str] = {}
-    if reading is not None:
-        for function in functions:
-            # A function for further types has their number behind its own name.
-            names[function.name] = (
-                f"{reading.names.get(function.source, function.source)}{function.name.removeprefix(function.source)}"
-            )
-    writer = _Writer(documents, {names.get(function.name, function.name) for function in functions}, names, reading)
+    short = names or {}
+    # A function for further types has their number behind its own name.
+    own = {one.name: f"{short.get(one.source, one.source)}{one.name.removeprefix(one.source)}" for one in functions}
+    writer = _Writer(documents, set(own.values()), own, short, declared or {}, has_entries=around is None)
     before = files("ppafo.translation").joinpath(prelude).read_text(encoding="utf-8")
     bodies = [writer.function(function) for function in functions]
     # Now all structs have their names, which no local name may hide: what has one is written again.
-    names_of_structs = {*writer.names.values(), *(f"make_{name}" for name in writer.names.values())}
+    names_of_structs = {*writer.struct_names.values(), *(f"make_{name}" for name in writer.struct_names.values())}
     writer.outer |= names_of_structs
     for number, function in enumerate(functions):
         if writer.locals[function.name] & names_of_structs:
             bodies[number] = writer.function(function)
     parts = [_PART] if any(f"{PART}(" in body for body in bodies) else []
-    structs = [text for kind in writer.structs for text in writer.written_struct(kind)]
-    if reading is not None:
-        own = "\n".join([*parts, *structs, *bodies])
-        before = before.replace("#if !defined(PPAFO_INLINE)\n", "", 1).replace("#endif\n", "", 1)
-        before = _prelude_for(before, own + reading.around)
-        return "\n".join([_comment(title), before, own]).replace("PPAFO_INLINE", "static")
-    return "\n".join([_comment(title), before, *parts, *structs, *bodies])
+    text = "\n".join([*parts, *(line for kind in writer.structs for line in writer.written_struct(kind)), *bodies])
+    if around is None:
+        return "\n".join([_comment(title), before, text])
+    before = before.replace("#if !defined(PPAFO_INLINE)\n", "", 1).replace("#endif\n", "", 1)
+    before = _prelude_for(before, text + around)
+    return "\n".join([_comment(title), before, text]).replace("PPAFO_INLINE", "static")
 
 
 _DEFINES = re.compile(r"(?:^|\s|\*)(ppafo_\w+)\(|\} (ppafo_\w+);|#define (PPAFO_\w+)")
@@ -149,10 +134,12 @@ class _Writer:
     documents: Mapping[str, str]
     outer: set[str]
     functions: Mapping[str, str]
-    reading: ReadableUnit | None = None
+    short: Mapping[str, str]
+    declared: Mapping[str, str]
+    has_entries: bool
     structs: list[Items | Row] = field(default_factory=list)
     constructed: set[Type] = field(default_factory=set)
-    names: dict[Type, str] = field(default_factory=dict)
+    struct_names: dict[Type, str] = field(default_factory=dict)
     locals: dict[str, set[str]] = field(default_factory=dict)
     owner: str = ""
 
@@ -164,72 +151,64 @@ class _Writer:
             return "ppafo_array"
         if isinstance(kind, RowReference):
             return f"{self.type_name(kind.row)} *"
-        if self.reading is not None and isinstance(kind, Row) and kind.name in self.reading.declared:
-            return self.reading.declared[kind.name]
+        if isinstance(kind, Row) and kind.name in self.declared:
+            return self.declared[kind.name]
         assert isinstance(kind, Items | Row)
-        if kind not in self.names:
+        if kind not in self.struct_names:
             wanted = own = self.struct_name(kind)
             number = 1
-            while {own, f"make_{own}"} & {*self.outer, *self.names.values()}:
+            while {own, f"make_{own}"} & {*self.outer, *self.struct_names.values()}:
                 number += 1
                 own = f"{wanted}_{number}"
-            self.names[kind] = own
+            self.struct_names[kind] = own
             for inner in types_in(kind):
                 if not is_empty(inner):
                     self.type_name(inner)
             self.structs.append(kind)
-        return self.names[kind]
+        return self.struct_names[kind]
 
     def struct_name(self, kind: Items | Row) -> str:
         """Return the preferred C name of a struct."""
         if isinstance(kind, Row):
-            return kind.name if self.reading is None else self.reading.names.get(kind.name, kind.name)
+            return self.short.get(kind.name, kind.name)
         if kind.is_uniform:
             return f"{self.type_name(kind.types[0]).removesuffix('_t')}s_{len(kind.types)}"
-        owner = self.owner if self.reading is None else self.reading.names.get(self.owner, self.owner)
-        return f"{owner}_result"
+        return f"{self.short.get(self.owner, self.owner)}_result"
 
     def written_struct(self, kind: Items | Row) -> list[str]:
-        """Return the declaration of a struct with its constructor function; readable units omit unused constructors."""
-        name = self.names[kind]
+        """Return the declaration of a struct, with its constructor function where one is called."""
+        name, is_array = self.struct_names[kind], isinstance(kind, Items) and kind.is_uniform
         if isinstance(kind, Items) and kind.is_uniform:
             inner, count = self.type_name(kind.types[0]), len(kind.types)
-            members = [("", f"{inner}{TIED}item[{count}]")]
-            parameters = [f"{inner}{TIED}item_{index}" for index in range(count)]
-            variable, fill = "made", [f"made.item[{index}] = item_{index};" for index in range(count)]
+            members = [(inner, f"item[{count}]")]
+            taken, variable = {f"item_{index}": inner for index in range(count)}, "made"
         else:
             if isinstance(kind, Row):
                 named = [(member_name(kind, own), inner) for own, inner in kind.fields]
             else:
                 named = [(f"item_{index}", inner) for index, inner in enumerate(types_in(kind))]
-            member_types = {own: self.type_name(inner) for own, inner in named if not is_empty(inner)}
-            members = [(own, f"{inner}{TIED}{own}") for own, inner in member_types.items()]
-            parameter_names = {own: c_name(own, member_types, {name, *member_types.values()}) for own in member_types}
-            parameters = [f"{inner}{TIED}{parameter_names[own]}" for own, inner in member_types.items()]
-            variable = c_name("made", parameter_names.values(), parameter_names.values())
-            fill = [f"{variable}.{own} = {parameter_names[own]};" for own, _ in members]
+            types = {own: self.type_name(inner) for own, inner in named if not is_empty(inner)}
+            members = [(inner, own) for own, inner in types.items()]
+            taken = {c_name(own, types, {name, *types.values()}): inner for own, inner in types.items()}
+            variable = c_name("made", taken, taken)
         comment = _comment(self.documents.get(kind.name, "")) if isinstance(kind, Row) else ""
-        declared = [f"    {text};".replace(TIED, " ") for _, text in members]
-        head = _wrapped(f"PPAFO_INLINE {name} make_{name}({', '.join(parameters)})")
-        body = ["{", f"    {name} {variable};", *(f"    {line}" for line in fill), f"    return {variable};", "}", ""]
-        if self.reading is not None:
-            # Neighbouring members of one type share a declaration.
-            declared = []
-            for shared, group in itertools.groupby((text.split(TIED) for _, text in members), key=lambda pair: pair[0]):
-                declared += _wrapped(f"    {shared} {', '.join(own for _, own in group)};", " " * 8)
+        declared: list[str] = []
+        # Neighbouring members of one type share a declaration.
+        for shared, group in itertools.groupby(members, key=lambda member: member[0]):
+            declared += _wrapped(f"    {shared} {', '.join(own for _, own in group)};", " " * 8)
         struct = [*([comment] if comment else []), "typedef struct {", *declared, f"}} {name};", ""]
-        if self.reading is not None:
-            listed = ", ".join(parameter.rpartition(TIED)[2] for parameter in parameters)
-            initialiser = f"{{{{{listed}}}}}" if isinstance(kind, Items) and kind.is_uniform else f"{{{listed}}}"
-            begin = _wrapped(f"    const {name} {variable} = {initialiser};", " " * 8)
-            body = ["{", *begin, f"    return {variable};", "}", ""]
-            return [*struct, *([*head, *body] if kind in self.constructed else [])]
-        return ["\n".join([*struct, *head, *body])]
+        if kind not in self.constructed:
+            return struct
+        listed = f"{{{', '.join(taken)}}}"
+        begin = f"    const {name} {variable} = {f'{{{listed}}}' if is_array else listed};"
+        parameters = ", ".join(f"{inner}{TIED}{own}" for own, inner in taken.items())
+        head = _wrapped(f"PPAFO_INLINE {name} make_{name}({parameters})")
+        return [*struct, *head, "{", *_wrapped(begin, " " * 8), f"    return {variable};", "}", ""]
 
     def function(self, function: Function) -> str:
         """Return the C code of a function, with its comment."""
         self.owner = function.source
-        writer = _Body(self, function, scopes_of(function))
+        writer = _Body(self, function, Scopes(function))
         # An unused parameter is a warning, and warnings are errors where people read the export.
         unused = [name for name, _ in function.parameters if name not in writer.scopes.read]
         body = [*(f"    (void){writer.name(name)};" for name in unused), *writer.block(function.body, 1)]
@@ -242,7 +221,7 @@ class _Writer:
             between = "" if isinstance(kind, RowReference) else TIED
             declared.append(f"{constant}{self.type_name(kind)}{between}{writer.name(name)}")
         parameters = ", ".join(declared)
-        is_shown = function.is_entry and self.reading is None
+        is_shown = function.is_entry and self.has_entries
         linkage = f"PPAFO_ENTRY {returns}" if is_shown else f"PPAFO_INLINE {returns}"
         head = _wrapped(f"{linkage} {self.functions.get(function.name, function.name)}({parameters or 'void'})")
         bound = [f"Here {text}." for text in function.bound]
@@ -291,15 +270,14 @@ class _Body:
                 if statement.name in self.scopes.read and not is_empty(statement.value.type):
                     starts = self.scopes.first.get(id(statement), "")
                     declared = f"{starts}{self.writer.type_name(statement.value.type)} " if starts else ""
-                    is_listed = starts and self.writer.reading is not None
-                    value = self.terms.listed(statement.value) if is_listed else self.terms.term(statement.value)
+                    value = self.terms.listed(statement.value) if starts else self.terms.term(statement.value)
                     yield from self.line(f"{declared.replace('let ', '')}{self.name(statement.name)} = {value};", level)
             case typed.Store():
                 yield from self.store(statement, level)
             case typed.Return():
                 value = ""
-                # Where people read, a struct that is returned has a name.
-                if statement.value.kind == "build" and self.writer.reading is not None:
+                # A struct that is returned has a name, for readers.
+                if statement.value.kind == "build":
                     value = c_name("made", self.kinds, {*self.writer.outer, *map(self.name, self.kinds)})
                     kind = self.writer.type_name(statement.value.type)
                     yield from self.line(f"const {kind} {value} = {self.terms.listed(statement.value)};", level)
@@ -332,8 +310,7 @@ class _Body:
         """Yield the lines of an assignment to an array element or to a field of a row."""
         value = store.value
         # Member by member reads better, but only where no member is read on the right.
-        is_read = self.writer.reading is not None and not value.reads & store.element.reads
-        if is_read and value.kind == "build" and isinstance(value.type, Row):
+        if not value.reads & store.element.reads and value.kind == "build" and isinstance(value.type, Row):
             for (name, kind), part in zip(value.type.fields, value.parts, strict=True):
                 if not is_empty(kind):
                     yield from self.store(typed.Store(Term("field", kind, (store.element,), name), part), level)

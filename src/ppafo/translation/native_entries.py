@@ -1,20 +1,18 @@
 """Entries of a compiled C library, with the interface of the Python functions of the composed text.
 
 Passing an array to C costs Python about a microsecond, passing a number a twentieth of a microsecond. The arrays of an
-entry are therefore packed into one block of memory, only once if the arrays stay the same.
+entry are therefore packed into one block of memory.
 """
 
 import ctypes
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.engine.compilers import CompilerError
 from ppafo.engine.entries import FLOAT, INT, entry_types
@@ -57,32 +55,22 @@ class NativeEntry:
     layout: struct.Struct
 
     def __call__(self, *arguments: Any) -> None:
-        """Call the entry with arrays followed by numbers."""
-        count = len(self.dimensions)
-        self.function(self._packed(arguments[:count]), *arguments[count:])
-
-    def with_arrays(self, *arrays: NDArray[np.float64]) -> Callable[..., None]:
-        """Return the entry bound to these arrays, as a function of its numbers.
+        """Call the entry with arrays followed by numbers.
 
         Raises TypeError for arrays that C would misread: wrong data type, wrong number of dimensions, or not
         contiguous.
         """
-        called: partial[None] = partial(self.function, self._packed(arrays))
-        called.arrays = arrays  # type: ignore[attr-defined]
-        return called
-
-    def _packed(self, arrays: Sequence[Any]) -> bytes:
-        numbers: list[int] = []
-        for array, dimensions in zip(arrays, self.dimensions, strict=True):
+        packed: list[int] = []
+        for array, dimensions in zip(arguments, self.dimensions, strict=False):
             if array.dtype != _FLOATS or array.ndim != dimensions:
                 problem = f"not one of {array.dtype} {array.shape}"
                 raise TypeError(
                     f"a compiled model needs a contiguous float64 array of {dimensions} dimensions, {problem}"
                 )
             # Refuses what is read-only, or does not lie row after row.
-            numbers.append(ctypes.addressof(_NO_FLOATS.from_buffer(array)))
-            numbers += array.shape
-        return self.layout.pack(*numbers)
+            packed.append(ctypes.addressof(_NO_FLOATS.from_buffer(array)))
+            packed += array.shape
+        self.function(self.layout.pack(*packed), *arguments[len(self.dimensions) :])
 
 
 def fill_module(module: ModuleType, library: Path, parameters: Mapping[str, Parameters]) -> None:

@@ -1,7 +1,6 @@
 """Scopes of local names: removal of unused assignments, innermost block of each declaration."""
 
 import ast
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 from ppafo.translation import typed
@@ -9,7 +8,6 @@ from ppafo.translation.typed import Function, Statement, Term
 from ppafo.translation.value_types import INT, Type
 
 Block = tuple[Statement, ...]
-_WITH_PARTS = (ast.expr, ast.stmt, ast.arguments)
 
 
 @dataclass(slots=True)
@@ -23,6 +21,7 @@ class Scopes:
     keyed by ``id``.
     """
 
+    function: Function
     read: set[str] = field(default_factory=set)
     types: dict[str, Type] = field(default_factory=dict)
     before: dict[int, list[str]] = field(default_factory=dict)
@@ -31,6 +30,14 @@ class Scopes:
     direct: dict[int, set[str]] = field(default_factory=dict)
     inside: dict[int, set[str]] = field(default_factory=dict)
     changes: dict[int, dict[str, int]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Determine the block in which each local name of the function is declared."""
+        body = self.function.body
+        self.look(body)
+        # In order of names: the order of a set changes from process to process, and an export has one text.
+        for name in sorted(self.types.keys() - {name for name, _ in self.function.parameters}):
+            self.place(name, body)
 
     def look(self, body: Block) -> tuple[set[str], dict[str, int]]:
         """Record the names that each statement mentions, and the assignments to each name in each block."""
@@ -139,16 +146,6 @@ def needed(body: Block, after: frozenset[str], leaving: frozenset[str] = frozens
     return tuple(kept[::-1]), live
 
 
-def scopes_of(function: Function) -> Scopes:
-    """Determine the block in which each local name of a function is declared."""
-    scopes = Scopes()
-    scopes.look(function.body)
-    # In order of names: the order of a set changes from process to process, and an export has one text.
-    for name in sorted(scopes.types.keys() - {name for name, _ in function.parameters}):
-        scopes.place(name, function.body)
-    return scopes
-
-
 def _begins(statement: Statement, name: str) -> bool:
     """Return whether a statement assigns a name without reading it."""
     return isinstance(statement, typed.Assign) and statement.name == name and name not in statement.value.reads
@@ -197,7 +194,7 @@ class ScopeNames:
     @classmethod
     def of(cls, definition: ast.FunctionDef) -> "ScopeNames":
         """Collect the names of a function definition."""
-        nodes = list(_nodes(definition))
+        nodes = list(ast.walk(definition))
         named = [node for node in nodes if isinstance(node, ast.Name)]
         every = {node.id for node in named}
         read = {node.id for node in named if isinstance(node.ctx, ast.Load)}
@@ -208,44 +205,6 @@ class ScopeNames:
         parameters = {node.arg for node in nodes if isinstance(node, ast.arg)}
         counters = {name for name in counting if counting.count(name) == stored.count(name)} - parameters
         return cls(frozenset(every | parameters), frozenset(read), frozenset(counters))
-
-
-def changed(body: Iterable[ast.stmt]) -> set[str]:
-    """Return the names assigned by statements, including nested blocks."""
-    names: set[str] = set()
-    for statement in body:
-        targets: list[ast.expr] = []
-        if isinstance(statement, ast.Assign):
-            targets = statement.targets
-        elif isinstance(statement, ast.AugAssign | ast.For):
-            targets = [statement.target]
-        for target in targets:
-            parts = target.elts if isinstance(target, ast.Tuple) else [target]
-            names.update(part.id for part in parts if isinstance(part, ast.Name))
-        if isinstance(statement, ast.If | ast.For | ast.While):
-            names |= changed(statement.body) | changed(statement.orelse)
-    return names
-
-
-def _nodes(definition: ast.FunctionDef) -> Iterator[ast.AST]:
-    """Yield names, arguments and loops of a definition, faster than ``ast.walk``."""
-    waiting: list[ast.AST] = [definition]
-    while waiting:
-        node = waiting.pop()
-        kind = type(node)
-        if kind is ast.Name or kind is ast.arg:
-            yield node
-        elif kind is ast.Attribute:
-            waiting.append(node.value)  # type: ignore[attr-defined]
-        elif kind is not ast.Constant:
-            if kind is ast.For:
-                yield node
-            for name in node._fields:
-                inner = getattr(node, name)
-                if type(inner) is list:
-                    waiting += filter(None, inner)
-                elif isinstance(inner, _WITH_PARTS):
-                    waiting.append(inner)
 
 
 def _counts_up(node: ast.For) -> bool:

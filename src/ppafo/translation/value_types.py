@@ -62,6 +62,11 @@ class RowReference:
 Type: TypeAlias = Scalar | Row | Items | Array | FunctionArgument | RowReference
 
 
+def declared_type(word: str) -> Type:
+    """Return the type that an entry declares, such as ``float64[:, ::1]``."""
+    return {"int64": INT, "float64": FLOAT}.get(word) or Array(word.count(":") - 1)
+
+
 def is_empty(kind: Type) -> bool:
     """Return whether a type contains no number: a function, or a row or tuple without numbers."""
     return all(map(is_empty, types_in(kind))) if isinstance(kind, Items | Row) else isinstance(kind, FunctionArgument)

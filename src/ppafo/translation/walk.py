@@ -14,11 +14,11 @@ from typing import Any
 
 from ppafo.engine.compilers import UntranslatableError
 from ppafo.engine.entries import entry_types
-from ppafo.engine.plain_python import parse_module, place_in, refusal
+from ppafo.engine.plain_python import parse_module, place_in, refusal, stored_names
 from ppafo.errors import ProgramError
 from ppafo.translation import typed
 from ppafo.translation.expressions import Expressions, kind_of
-from ppafo.translation.scopes import ScopeNames, changed, needed
+from ppafo.translation.scopes import ScopeNames, needed
 from ppafo.translation.typed import Function, Module, Parameter, Statement, Term, converted
 from ppafo.translation.value_types import (
     BOOL,
@@ -31,6 +31,7 @@ from ppafo.translation.value_types import (
     RowReference,
     Scalar,
     Type,
+    declared_type,
     is_empty,
     joined,
     mixes,
@@ -47,11 +48,7 @@ def walk_module(
     decorator. ``library`` has the functions of ``LIBRARY`` that may be called.
     """
     if entries is None:
-        plain: dict[str, Type] = {"int64": INT, "float64": FLOAT}
-        entries = {
-            name: tuple(plain.get(word) or Array(word.count(":") - 1) for word in words)
-            for name, words in entry_types(source).items()
-        }
+        entries = {name: tuple(map(declared_type, words)) for name, words in entry_types(source).items()}
     walk = _ModuleWalk(source.split("\n"), entries, library)
     for node in parse_module(source).body:
         if isinstance(node, ast.Assign) and isinstance(node.value, ast.Call) and isinstance(node.targets[0], ast.Name):
@@ -257,7 +254,7 @@ class _FunctionWalk:
             raise self.refused(node, f"'{ast.unparse(call)}' has a step of 0")
         self.note_type(name, INT, node)
         before: list[Statement] = []
-        if stop.reads & {name, *changed(node.body)}:
+        if stop.reads & {name, *stored_names(node.body)}:
             # Python asks for the end of a range once.
             end = self.fresh(f"{name}_stop", INT)
             before, stop = [self.assign(end, stop, node)], Term("name", INT, (), end)
@@ -268,7 +265,7 @@ class _FunctionWalk:
         owner = self.values.term(node.iter.value if isinstance(node.iter, ast.Subscript) else node.iter)
         if not isinstance(owner.type, Items) or not owner.type.is_uniform:
             raise self.refused(node, f"'{ast.unparse(node.iter)}' must be a tuple with items of one type")
-        if owner.reads & {name, *changed(node.body)}:
+        if owner.reads & {name, *stored_names(node.body)}:
             raise self.refused(node, f"the loop assigns '{ast.unparse(node.iter)}' while it iterates over it")
         indices = range(len(owner.type.types))
         if isinstance(node.iter, ast.Subscript):

@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 
 from ppafo.errors import ProgramError
 from ppafo.translation import typed
-from ppafo.translation.typed import Function, Module, Parameter, Statement, Term
+from ppafo.translation.typed import Function, Module, Parameter, Statement, Term, converted
 from ppafo.translation.value_types import BOOL, INT, INT16, INT32, Items, Row, Scalar, Type, types_in
 
 # Loops are gone through turn by turn: more would take long, and no fixed-point law has them.
@@ -315,10 +315,3 @@ class _Narrowing:
         elif term.kind == "choice" and not isinstance(term.type, Scalar):
             own = whole[0].type
         return replace(term, type=own, parts=(*parts[: len(parts) - len(whole)], *whole))
-
-
-def converted(term: Term, kind: Type) -> Term:
-    """Convert a term to another width, which is proven to contain its value."""
-    if term.type == kind:
-        return term
-    return replace(term, type=kind) if term.kind == "number" else Term("convert", kind, (term,))

@@ -102,6 +102,6 @@ def test_a_group_that_nothing_has_is_refused_with_the_nearest_name(
 ) -> None:
     monkeypatch.setenv("PPAFO_BACKEND", backend)
     monkeypatch.setattr(phases, "begin_step", unmade)
-    said = r"test_edits_of_the_step\.py:\d+: 'lane.befor' is not set by an earlier phase .*did you mean 'before'"
+    said = r"test_edits_of_the_step\.py:\d+: 'lane.befor' is not handed on by an earlier phase .*did you mean 'before'"
     with pytest.raises(ProgramError, match=said):
         run_batch(batch_of(plan_run(load_scenario("step-response", ("run.duration=2 ms",)))))

@@ -16,9 +16,7 @@ from ppafo.engine.entries import (
     HEADER,
     INT,
     entry_text,
-    with_arrays,
 )
-from ppafo.translation.native_entries import NativeEntry
 from tests.compilers_here import modules_of
 
 ARRAY_2D = "float64[:, ::1]"
@@ -56,25 +54,14 @@ def scaled(rows: Table, found: Vector, factor: float, first: int) -> None:
         found[row] = factor * total
 
 
-@pytest.mark.parametrize("is_packed", [False, True])
-def test_every_compiler_has_all_entries_of_a_module(is_packed: bool) -> None:
+def test_every_compiler_has_all_entries_of_a_module() -> None:
     rows, expected = np.arange(6.0).reshape(3, 2), np.zeros(3)
     scaled(rows, expected, 0.5, 1)
     for name, module in modules_of(array_module([scaled])).items():
         found = np.zeros(3)
-        call: Callable[..., None] = with_arrays(module.scaled, rows, found) if is_packed else module.scaled
-        for first in (1, 2):  # what is packed once is used twice
-            call(*(() if is_packed else (rows, found)), 0.5, first)
+        for first in (1, 2):
+            module.scaled(rows, found, 0.5, first)
         assert found.tolist() == expected.tolist(), name
-
-
-def test_what_is_packed_is_read_and_written_where_it_lies() -> None:
-    for module in modules_of(array_module([scaled])).values():
-        rows, found = np.ones((3, 2)), np.zeros(3)
-        call = with_arrays(module.scaled, rows, found)
-        rows[:] = 4.0
-        call(1.0, 0)
-        assert found.tolist() == [8.0] * 3
 
 
 @pytest.mark.parametrize(
@@ -92,6 +79,3 @@ def test_an_array_that_c_would_misread_is_refused(wrong: Any) -> None:
     for module in modules_of(array_module([scaled])).values():
         with pytest.raises(TypeError):
             module.scaled(wrong, np.zeros(3), 1.0, 0)
-        if isinstance(module.scaled, NativeEntry):
-            with pytest.raises(TypeError):
-                with_arrays(module.scaled, wrong, np.zeros(3))

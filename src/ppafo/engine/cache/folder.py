@@ -3,7 +3,6 @@
 import contextlib
 import os
 import stat
-from collections.abc import Collection
 from functools import cache
 from pathlib import Path
 
@@ -87,31 +86,15 @@ def _is_own_group(number: int) -> bool:
     return user.pw_gid == number and group.gr_name == user.pw_name and set(group.gr_mem) <= {user.pw_name}
 
 
-def is_own_file(status: os.stat_result, above: os.stat_result) -> bool:
-    """Return whether a file and its folder belong to this user or root and are writable for nobody else."""
-    if not (stat.S_ISREG(status.st_mode) and stat.S_ISDIR(above.st_mode)):
-        return False
-    if not hasattr(os, "geteuid"):
-        return True
-    is_written = (status.st_mode | above.st_mode) & _WRITTEN_BY_OTHERS
-    return not is_written and {status.st_uid, above.st_uid} <= {0, os.geteuid()}
+def is_private(*paths: Path) -> bool:
+    """Return whether files and folders belong to this user or root, are no links and are writable for nobody else.
 
-
-def is_own(kept: Path, files: Collection[str]) -> bool:
-    """Return whether a program folder and all its files belong to this user and are writable for nobody else.
-
-    Files created while others could write still belong to others. Nobody else can change a file between this check and
-    its use.
+    Nobody else can change one between this check and its use. OSError for a path that is not there.
     """
-    statuses = [kept.lstat()]
-    for entry in kept.rglob("*"):
-        with contextlib.suppress(FileNotFoundError):
-            statuses.append(entry.lstat())
-    if not hasattr(os, "geteuid"):
-        return stat.S_ISDIR(statuses[0].st_mode)
+    statuses = [path.lstat() for path in paths]
+    if not all(stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode) for status in statuses):
+        return False
     # Root may own a file: what root can do, no check prevents.
-    is_whose = all(status.st_uid in (0, os.geteuid()) for status in statuses)
-    used = [status for status in statuses if stat.S_ISDIR(status.st_mode)]
-    is_folder = statuses[0] in used
-    used += [(kept / name).lstat() for name in files]
-    return is_whose and is_folder and bool(files) and not any(status.st_mode & _WRITTEN_BY_OTHERS for status in used)
+    return not hasattr(os, "geteuid") or all(
+        status.st_uid in (0, os.geteuid()) and not status.st_mode & _WRITTEN_BY_OTHERS for status in statuses
+    )

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import ModuleType
 
 from ppafo.documents.regular_file import read_regular_file
-from ppafo.engine.cache.folder import cache_folder, is_own
+from ppafo.engine.cache.folder import cache_folder, is_private
 from ppafo.engine.compilers import Compiler
 from ppafo.engine.entries import without_origins
 
@@ -87,10 +87,10 @@ def is_whole(folder: Path) -> bool:
         stated = json.loads(read_regular_file(folder / CHECKSUMS))
         # Other files in the folder are no part of it.
         files = stated.items() if isinstance(stated, dict) else ()
-        names = [name for name, _ in files]
+        # What was made while others could write may still be another's.
         return (
-            bool(names)
-            and is_own(folder, [CHECKSUMS, *names])
+            bool(files)
+            and is_private(folder, *folder.rglob("*"))
             and all(hashlib.sha256(read_regular_file(folder / name)).hexdigest() == digest for name, digest in files)
         )
     except (OSError, ValueError, RecursionError):

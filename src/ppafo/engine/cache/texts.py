@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ppafo.documents.regular_file import read_regular_file
-from ppafo.engine.cache.folder import TEXTS, cache_folder, is_own_file, refusal
+from ppafo.engine.cache.folder import TEXTS, cache_folder, is_private, refusal
 
 MAXIMUM_BYTES = 50_000_000
 """Total size of all texts [byte] above which the least recently used texts are removed."""
@@ -38,7 +38,7 @@ def kept_bytes(kind: str, made_from: str, make: Callable[[], bytes]) -> bytes:
 def _read(file: Path) -> bytes | None:
     try:
         # It may be run: file and folder must be this user's, and nobody else may write there.
-        if not is_own_file(file.lstat(), file.parent.lstat()):
+        if not is_private(file, file.parent):
             return None
         content = read_regular_file(file)
         os.utime(file)

@@ -1,17 +1,14 @@
 """Actuators of any type: chamber and torque functions for compiled steps, and their evaluation from Python."""
 
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
-import numpy as np
-
-from ppafo.engine.rows import leaves, rebuilt
+from ppafo.engine.rows import of_each
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_pressures
 from ppafo.model.actuators.kind import ActuatorModel, Chambers
 from ppafo.model.actuators.vane import MODEL as VANE
 from ppafo.model.actuators.vane import chambers
 from ppafo.model.binding import made_of
-from ppafo.model.columns import over_runs
 from ppafo.model.declaration import PlainFunction
 from ppafo.model.plant import (
     ActuatorFunctions,
@@ -60,17 +57,8 @@ def functions_of_actuator(actuator: ActuatorModel) -> ActuatorFunctions:
 
 def _of_plant(actuator: ActuatorModel, function: PlainFunction, plant: Any, *given: Any) -> Any:
     """Return the result of a model function, whose arguments may be numbers or arrays of one length."""
-    if actuator is VANE:
-        return function(plant, *given)
     # A kind's function takes floats: where numbers are columns it is called for each combination.
-    flat = leaves(plant)
-    if not any(isinstance(number, np.ndarray) for number in flat):
-        return over_runs(partial(function, plant), *given)
-
-    def alone(*values: float) -> Any:
-        return function(rebuilt(actuator.plant, values[: len(flat)]), *values[len(flat) :])
-
-    return over_runs(alone, *flat, *given)
+    return function(plant, *given) if actuator is VANE else of_each(function, plant, *given)
 
 
 def pressures_of(actuator: ActuatorModel, plant: Any, angle: Any, mass_1: Any, mass_2: Any) -> tuple[Any, Any]:

@@ -5,16 +5,15 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 from ppafo.engine.definitions import place_of
-from ppafo.engine.entries import indent, parse_expression
+from ppafo.engine.entries import indent, parse_expression, rewritten
 from ppafo.engine.generator import StepText
-from ppafo.engine.reduction import names_in
-from ppafo.engine.rows import leaf_paths
+from ppafo.engine.plain_python import stored_names
+from ppafo.engine.rows import given, leaf_paths
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library.exported import COUNTS
 from ppafo.exports.c_library.library import ExportParameter, Library, c_identifier
 from ppafo.exports.c_library.preparation import Preparation
-from ppafo.exports.c_library.program import given
 from ppafo.exports.c_library.settings import numbers_of_second_chamber
 from ppafo.model.declaration import PlainFunction
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, Link
@@ -47,12 +46,12 @@ def prepare_entry(
     # Meters begin with the first sample.
     later = {"course", *program.meter_groups}
     states = {name: row for name, row in program.state_rows().items() if name not in later}
-    made = {name.id for line in lines for name in names_in(line) if isinstance(name.ctx, ast.Store)}
+    made = stored_names(lines)
     for name, row in (program.parameter_rows() | states).items():
         if name not in made and leaf_paths(row, name):
             last = place_of(functions[-1])
             raise ProgramError(f"{last}: no preparation function sets '{name}' ({row.__name__}) of the program")
-    written = _FromSettings(cells_of(preparation.scenario, settings)).written
+    written = partial(_written, cells=cells_of(preparation.scenario, settings))
     body = [*map(written, lines), *given("parameters", program.parameter_rows())]
     body += given("states", states)
     body += [f"counts.{name} = {written(number)}" for name, number in zip(COUNTS, counts.value.elts, strict=True)]
@@ -69,7 +68,7 @@ def check_entry(
     *lines, place = StepText(preparation.program, collector).joined(rules, preparation, ["settings"])
     assert isinstance(place, ast.Return), "the last function gives the place"
     assert place.value is not None
-    written = _FromSettings(cells_of(preparation.scenario, settings)).written
+    written = partial(_written, cells=cells_of(preparation.scenario, settings))
     body = [*map(written, lines), f"found.place = {written(place.value)}"]
     return "\n".join(["def check_profiles(settings, found):", *indent(body)])
 
@@ -88,22 +87,15 @@ def with_reach(library: Library, collector: SourceCollector) -> str:
     return "\n".join([library.further(collector), "", "def reach(parameters, angle, found):", *indent(lines)])
 
 
-class _FromSettings(ast.NodeTransformer):
-    """Rewriter of reduced ``settings[PATH]`` as its source in ``cells``."""
+def _written(node: ast.AST, cells: Mapping[str, str]) -> str:
+    """Return the text of a statement or expression with each reduced ``settings[PATH]`` as its source in ``cells``."""
 
-    def __init__(self, cells: Mapping[str, str]) -> None:
-        self.cells = cells
+    def source(part: ast.expr) -> ast.expr | None:
+        if isinstance(part, ast.Attribute) and ast.unparse(part.value) == "settings":
+            return parse_expression(cells[part.attr])
+        return None
 
-    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        """Rewrite a setting."""
-        if isinstance(node.value, ast.Name) and node.value.id == "settings":
-            return parse_expression(self.cells[node.attr])
-        self.generic_visit(node)
-        return node
-
-    def written(self, node: ast.AST) -> str:
-        """Return the text of a rewritten statement or expression."""
-        return ast.unparse(ast.fix_missing_locations(self.visit(node)))
+    return ast.unparse(ast.fix_missing_locations(rewritten(node, source)))
 
 
 def cells_of(scenario: Scenario, settings: Sequence[ExportParameter]) -> dict[str, str]:
@@ -129,7 +121,7 @@ def follow_entry(
             parts, groups = of_loop[0].parts, [name for link in of_loop for name in link.groups]
             functions = parts.functions(groups, partial(number_at, scenario))
             joined = StepText(preparation.program, collector).joined(functions, parts, ["settings"])
-            lines += map(_FromSettings(cells).written, joined)
+            lines += map(partial(_written, cells=cells), joined)
         name, own = c_identifier(path), cells[path]
         text = own
         # The first link that holds wins, so it is the outermost choice.

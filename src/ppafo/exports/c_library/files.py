@@ -85,19 +85,6 @@ def library_files(library: Library) -> dict[str, bytes]:
     return {file: text.encode() for file, text in sorted(texts.items())}
 
 
-def run_words(library: Library) -> dict[str, str]:
-    """Template variables for the arrays of a run, common to all templates that build a run from settings."""
-    program = library.program
-    return {
-        "never": repr(NEVER_FAILED),
-        "same_moment": repr(SAME_MOMENT),
-        "signal_rows": str(SIGNAL_ROWS),
-        "output_count": str(len(program.outputs)),
-        "metric_count": str(len(program.metrics)),
-        "setting_count": str(len(library.settings)),
-    }
-
-
 def _words(library: Library, name: str) -> dict[str, str]:
     """Template variables of an exported library; its own entries override the defaults."""
     settings, program, api = library.settings, library.program, library.api
@@ -130,7 +117,12 @@ def _words(library: Library, name: str) -> dict[str, str]:
     # Every scenario has a supply pressure, which is what a user would try first.
     (pressure,) = [setting for setting in settings if setting.name == "supply_pressure"]
     return {
-        **run_words(library),
+        "never": repr(NEVER_FAILED),
+        "same_moment": repr(SAME_MOMENT),
+        "signal_rows": str(SIGNAL_ROWS),
+        "output_count": str(len(program.outputs)),
+        "metric_count": str(len(program.metrics)),
+        "setting_count": str(len(settings)),
         "name": name,
         "NAME": name.upper(),
         "title": library.title,
@@ -168,7 +160,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "in_parts": in_parts,
         "run": filled(template(_FOLDER, "run.h"), {"name": name}),
         "steps": filled(template(_FOLDER, "steps.c"), steps),
-        "first": "".join(f"    before.{setting} = before.{api.step};\n" for setting in api.as_step),
+        "first": "",
         "follow": "" if library.following is None else "    follow(&before, &all);",
         **library.words,
         **api.words,

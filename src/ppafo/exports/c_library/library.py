@@ -74,18 +74,13 @@ Switch = tuple[Sequence[str], bool]
 
 @dataclass(frozen=True, slots=True)
 class LibraryApi:
-    """API variant of an exported library: header, example, README and source templates; ``words`` fill them.
-
-    Each setting in ``as_step`` always equals the setting ``step``.
-    """
+    """API variant of an exported library: header, example, README and source templates; ``words`` fill them."""
 
     header: str
     main: str
     page: str
     source: str
     words: Mapping[str, str] = field(default_factory=dict)
-    step: str = ""
-    as_step: tuple[str, ...] = ()
 
 
 LOOP = LibraryApi("interface.h", "main.c", "README.md", "loop.c")

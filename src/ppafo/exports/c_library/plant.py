@@ -225,10 +225,9 @@ def _api_of(alone: PlantAlone) -> LibraryApi:
         "follow_inputs": follow_lines(alone, "first", by_name),
         "hidden": ", ".join(f"`{c_identifier(path)}`" for path in sorted(alone.hidden)),
         "step": f"{alone.step:g}",
+        "first": "".join(f"    before.{setting} = before.{c_identifier(STEPS)};\n" for setting in _AS_STEPS),
     }
-    return LibraryApi(
-        "plant.h", "plant_main.c", "plant_README.md", "plant.c", words, step=c_identifier(STEPS), as_step=_AS_STEPS
-    )
+    return LibraryApi("plant.h", "plant_main.c", "plant_README.md", "plant.c", words)
 
 
 def follow_lines(alone: PlantAlone, settings: str, inputs: Mapping[str, str]) -> str:

@@ -12,29 +12,20 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+import numpy as np
+
 from ppafo.engine.entries import HEADER, INLINE, indent
 from ppafo.engine.generator import StepText
 from ppafo.engine.linking import link_program
-from ppafo.engine.loop_text import LOOP_ARRAYS, LOOP_NUMBERS, run_loop
-from ppafo.engine.rows import is_number, is_row, leaf_paths, members
-from ppafo.engine.source_text import Replacements, SourceCollector, composed_lines
+from ppafo.engine.loop_text import LOOP_OF_RUN, run_loop
+from ppafo.engine.rows import is_number, is_row, leaf_paths, members, taken
+from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, WHOLE, ExportedProgram, Further
 from ppafo.metrics.metric import ReadAt, Readings
 from ppafo.model.columns import over_runs
-from ppafo.model.one_run import FOR_ONE_RUN
-from ppafo.translation.value_types import FLOAT, INT, Array, Items, Row, RowReference, Type
+from ppafo.translation.value_types import FLOAT, INT, Items, Row, RowReference, Type, declared_type
 
 NameOf = Callable[[type], str]
-
-
-def taken(array: str, group: str, groups: Mapping[str, type]) -> str:
-    """Return the expression that reads the struct of a group."""
-    return f"{array}.{group}" if leaf_paths(groups[group], group) else "()"
-
-
-def given(array: str, groups: Mapping[str, type]) -> list[str]:
-    """Return the lines that assign each group to its struct field."""
-    return [f"{array}.{name} = {name}" for name, row in groups.items() if leaf_paths(row, name)]
 
 
 def struct_of(name: str, groups: Mapping[str, type], name_of: NameOf) -> RowReference:
@@ -82,6 +73,20 @@ class _ForOneRun(ast.NodeTransformer):
             return node
         return ast.copy_location(ast.Call(node.args[0], node.args[1:], node.keywords), node)
 
+    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
+        """Leave out what is done with columns."""
+        self.generic_visit(node)
+        return node.orelse if self.asks_for_columns(node.test) else node
+
+    def visit_If(self, node: ast.If) -> Any:
+        """Leave out what is done with columns."""
+        self.generic_visit(node)
+        return node.orelse if self.asks_for_columns(node.test) else node
+
+    def asks_for_columns(self, test: ast.expr) -> bool:
+        """Return whether a condition asks whether numbers are columns."""
+        return any(isinstance(node, ast.Attribute) and self.value_of(node) is np.ndarray for node in ast.walk(test))
+
     def value_of(self, node: ast.expr) -> Any:
         """Value of a constant, a name or an attribute; None for any other expression."""
         if isinstance(node, ast.Constant):
@@ -91,11 +96,6 @@ class _ForOneRun(ast.NodeTransformer):
         return getattr(self.value_of(node.value), node.attr, None) if isinstance(node, ast.Attribute) else None
 
 
-LOOP_TYPES: tuple[Type, ...] = (
-    *map(Array, LOOP_ARRAYS.values()),
-    *(FLOAT if kind == "float64" else INT for kind in LOOP_NUMBERS.values()),
-)
-"""Types of the arguments of a run's loop, except states and parameters."""
 _ENDINGS = {WHOLE: "", IN_PARTS: "_in_parts"}
 
 
@@ -113,7 +113,7 @@ def c_text_of_run(
     ``name`` is the prefix of the structs of settings and metrics, which the enclosing file declares. ``further`` may
     add functions that take ``settings``. ``worded`` puts comments in the words of the actuator and joint.
     """
-    from ppafo.translation.c99 import ReadableUnit, c_source, documents_of
+    from ppafo.translation.c99 import c_source, documents_of
     from ppafo.translation.c_terms import is_free
     from ppafo.translation.walk import walk_module
 
@@ -121,7 +121,6 @@ def c_text_of_run(
     collector = SourceCollector(
         INLINE,
         lambda function, tree: ast.fix_missing_locations(_ForOneRun(function.__globals__).visit(tree)),
-        replacements=Replacements(everywhere=dict(FOR_ONE_RUN)),
     )
     program = exported.program
     link_program(program, collector.replacements)
@@ -137,8 +136,9 @@ def c_text_of_run(
     outputs = struct_of_numbers(f"{name}_outputs", ["time", *exported.outputs])
     samples = RowReference(Row("run_samples", (("last", outputs.row), ("before", outputs.row))))
     metrics_row = struct_of_numbers(f"{name}_metrics", [kind.name for kind in exported.metrics])
+    chooses = [INT] if program.chooses_parts else []
     types: dict[str, tuple[Type, ...]] = {
-        WHOLE: (states, parameters, samples, *LOOP_TYPES, *([INT] if exported.program.chooses_parts else [])),
+        WHOLE: (states, parameters, samples, *map(declared_type, LOOP_OF_RUN.values()), *chooses),
         "metrics": (states, INT, metrics_row),
         "prepare": (settings_row, parameters, states, struct_of_numbers("run_counts", COUNTS)),
         "follow": (settings_row, settings_row),
@@ -158,9 +158,9 @@ def c_text_of_run(
         walk_module(composed, types),
         documents,
         title,
-        reading=ReadableUnit(
-            short, {kind.row.name: kind.row.name for kind in (settings_row, outputs, metrics_row)}, around
-        ),
+        names=short,
+        declared={kind.row.name: kind.row.name for kind in (settings_row, outputs, metrics_row)},
+        around=around,
     )
 
 
@@ -207,10 +207,8 @@ def metrics_entry(exported: ExportedProgram, collector: SourceCollector) -> str:
     """Return the source of the entry ``metrics``: metrics of a run from its final states."""
     program, groups = exported.program, exported.program.state_rows()
     names = [kind.name for kind in program.meters]
-    meters = ", ".join(
-        f"{name}={taken('states', group, groups)}" for name, group in zip(names, program.meter_groups, strict=True)
-    )
-    course = taken("states", "course", groups)
+    course, *of_meters = (taken("states", name, groups[name]) for name in ("course", *program.meter_groups))
+    meters = ", ".join(f"{name}={value}" for name, value in zip(names, of_meters, strict=True))
     lines = [f"readings = Readings(meters=Meters({meters}), course={course}, samples=samples)"]
     for metric in exported.metrics:
         if isinstance(metric.read, ReadAt):

@@ -66,7 +66,13 @@ def settings_of(scenario: Scenario, recorded: float | None) -> tuple[ExportParam
 
     ``recorded`` is the output interval [s] of a walk, which follows from its duration; else the scenario has its own.
     """
-    run, declared, period = scenario.run, declared_settings(scenario), scenario.controller.period
+    run, device, period = scenario.run, scenario.device, scenario.controller.period
+    # Without unused coefficients of an orifice, effects that are off, and other spellings of a number.
+    unused = {"controller.rate"}
+    unused |= {f"{section}.{name}" for section in ("valve", "actuator.leak") for name in other_form(device, section)}
+    is_off = (effect for effect in device_effects() if effect not in effects_of(device))
+    unused |= {f"{effect.section}.{quantity.name}" for effect in is_off for quantity in effect.quantities}
+    declared = {path: quantity for path, quantity in declared_numbers(scenario).items() if path not in unused}
     times = {"run.duration": run.duration, "run.step": run.step, "controller.period": period}
     times["run.output_interval"] = run.output_interval if recorded is None else recorded
     if recorded is None:
@@ -156,18 +162,3 @@ def numbers_of_second_chamber(scenario: Scenario) -> dict[str, float]:
         return {}
     unused = {f"actuator.leak.{name}" for name in other_form(scenario.device, "actuator.leak")}
     return {path: number_at(scenario, path) for path in sorted(OF_SECOND_CHAMBER - unused)}
-
-
-def declared_settings(scenario: Scenario) -> dict[str, Quantity]:
-    """Return declarations by path, without unused orifice coefficients, inactive effects and alternative paths."""
-    device = scenario.device
-    unused = {"controller.rate"}
-    unused |= {f"{section}.{name}" for section in ("valve", "actuator.leak") for name in other_form(device, section)}
-    is_on = effects_of(device)
-    unused |= {
-        f"{effect.section}.{quantity.name}"
-        for effect in device_effects()
-        if effect not in is_on
-        for quantity in effect.quantities
-    }
-    return {path: quantity for path, quantity in declared_numbers(scenario).items() if path not in unused}

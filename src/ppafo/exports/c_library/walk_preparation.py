@@ -81,7 +81,7 @@ def rules_of_walk(configuration: Scenario, settings: Iterable[ExportParameter]) 
 
 
 def put_walking_leg_on(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Set leg, gait, and the plant with both; the heel rocker has been fitted to the gait beforehand."""
+    """Set leg, gait, the plant with both, and the sensors; the heel rocker has been fitted to the gait beforehand."""
     gait = walk_of(parts.scenario).gait
     lane["wearer"] = section_row(parts.row("Wearer", names_of(WEARER)), settings, "wearer")
     lane["rocker"] = rocker_on_heel(
@@ -92,14 +92,8 @@ def put_walking_leg_on(parts: Preparation, lane: PreparedLane, settings: Any) ->
     lane.plant = with_leg(lane["bare"], lane.leg)
     lane.gait = parts.constant(gait_series(gait))
     lane.gait_timing = parts.constant(gait_timing(gait))
-
-
-def set_walk_sensors(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Set the sensors."""
-    lane.gait_sensors = gait_sensors(
-        section_row(parts.row("SensorNumbers", (*_FORCES, *_OTHERS)), settings, "sensors"),
-        settings["controller.period"],
-    )
+    numbers_of_sensors = section_row(parts.row("SensorNumbers", (*_FORCES, *_OTHERS)), settings, "sensors")
+    lane.gait_sensors = gait_sensors(numbers_of_sensors, settings["controller.period"])
 
 
 def count_walk_steps(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
@@ -142,7 +136,7 @@ def start_walk(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
 
 
 WALK_PREPARATION = (
-    *(set_plant, put_walking_leg_on, set_walk_sensors, count_walk_steps, set_timing),
+    *(set_plant, put_walking_leg_on, count_walk_steps, set_timing),
     *(set_walking_law, set_gas, start_walk, start, counted),
 )
 """Functions that prepare the run of a walk, in order of calling; the last one returns the step counts."""
