@@ -549,7 +549,7 @@ class Reduction:
             # A trace has the names of its channels.
             words = [self.module.parts.traced[index] if history == TRACE else str(index) for index in known]
             name = "_".join(["new", history.removesuffix("_history"), *words]).replace(".", "_")
-            self.note_slot(name, Slot(history, places), target)
+            self.note_slot(name, Slot(history, places))
             return ast.Name(_GROUP + name, ast.Store())
         if not isinstance(target, ast.Name):
             raise self.refuse(target, f"'{ast.unparse(target)}' cannot be assigned in a phase")
@@ -561,12 +561,8 @@ class Reduction:
         self.effects.groups[name] = None if known is None or fields is None else known | fields
         self.groups_set.add(name)
 
-    def note_slot(self, name: str, slot: Slot, where: ast.AST) -> None:
-        """Record a history element that is set. ProgramError for indices unknown to the loop over steps."""
-        if any(name.id not in self.parameters for index in slot.places for name in names_in(index)):
-            raise self.refuse(
-                where, "the index of a history must be a parameter of the phase, or a field of a parameter"
-            )
+    def note_slot(self, name: str, slot: Slot) -> None:
+        """Record a history element that is set."""
         self.effects.slots[name] = slot
         self.groups_set.add(name)
 
@@ -618,7 +614,7 @@ class Reduction:
         given_by_name = {key: self.visit(value) for key, value in own} if effects.slots else {}
         for result, slot in effects.slots.items():
             places = tuple(with_arguments(index, given_by_name) for index in slot.places)
-            self.note_slot(result, Slot(slot.history, places), node)
+            self.note_slot(result, Slot(slot.history, places))
         call = ast.Call(self.placeholder(called), arguments, [])
         groups = [ast.Name(_GROUP + result, ast.Store()) for result in effects.results]
         if len(groups) == 1:

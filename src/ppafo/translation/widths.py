@@ -4,14 +4,14 @@ Every function of a module is evaluated with the ranges of its arguments. The ra
 item determines its width. Values beyond 32 bits are refused, so that the remaining code cannot overflow.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple, TypeAlias
 
 from ppafo.errors import ProgramError
 from ppafo.translation import typed
 from ppafo.translation.typed import Function, Module, Parameter, Statement, Term, converted
-from ppafo.translation.value_types import BOOL, INT, INT16, INT32, Items, Row, Scalar, Type, types_in
+from ppafo.translation.value_types import INT, INT16, INT32, Items, Row, Scalar, Type, types_in
 
 # Loops are gone through turn by turn: more would take long, and no fixed-point law has them.
 MOST_TURNS = 64
@@ -86,12 +86,11 @@ class _Ranges:
         names: Names = {}
         for (name, kind), value in zip(function.parameters, arguments, strict=True):
             self.keep(function, names, name, kind, value)
-        results: list[Range] = []
-        self.run(function, function.body, names, results)
-        # Every return may be the one that is taken.
-        result = results[0]
-        for other in results[1:]:
-            result = hull(result, other)
+        *body, last = function.body
+        self.run(function, body, names)
+        if not isinstance(last, typed.Return):
+            raise _refused(function, "the only 'return' must be the last statement")
+        result = self.value(function, last.value, names)
         self.returned[function.name] = hull(self.returned.get(function.name, result), result)
         return result
 
@@ -109,28 +108,18 @@ class _Ranges:
             for part, own in zip(types_in(kind), value, strict=True):
                 self.note(part, own)
 
-    def run(self, function: Function, body: tuple[Statement, ...], names: Names, results: list[Range]) -> None:
-        """Evaluate statements: update the ranges of names, append ranges of returned values."""
+    def run(self, function: Function, body: Sequence[Statement], names: Names) -> None:
+        """Evaluate statements: update the ranges of names."""
         for statement in body:
             if isinstance(statement, typed.Assign):
-                self.keep(
-                    function, names, statement.name, statement.value.type, self.value(function, statement.value, names)
-                )
-            elif isinstance(statement, typed.Return):
-                results.append(self.value(function, statement.value, names))
-            elif isinstance(statement, typed.If):
-                self.value(function, statement.test, names)
-                # Each branch goes on from what held before both.
-                other = dict(names)
-                self.run(function, statement.body, names, results)
-                self.run(function, statement.otherwise, other, results)
-                _join(names, other)
+                value = self.value(function, statement.value, names)
+                self.keep(function, names, statement.name, statement.value.type, value)
             elif isinstance(statement, typed.CountedLoop) and statement.step == 1:
-                self.count(function, statement, names, results)
+                self.count(function, statement, names)
             else:
                 raise _refused(function, f"the statement '{type(statement).__name__.lower()}' is not supported")
 
-    def count(self, function: Function, loop: typed.CountedLoop, names: Names, results: list[Range]) -> None:
+    def count(self, function: Function, loop: typed.CountedLoop, names: Names) -> None:
         """Evaluate a loop by iterations; names then have their ranges over all possible counts."""
         start, stop = (self.value(function, part, names) for part in (loop.start, loop.stop))
         assert isinstance(start, IntegerRange)
@@ -142,7 +131,7 @@ class _Ranges:
         after = dict(names) if stop.low <= start.low else None
         for turn in range(start.low, stop.high):
             names[loop.name] = IntegerRange(turn, turn)
-            self.run(function, loop.body, names, results)
+            self.run(function, loop.body, names)
             # From here on the loop may have ended.
             if turn + 1 >= stop.low:
                 if after is None:
@@ -189,8 +178,6 @@ def _calculated(function: Function, term: Term, parts: list[IntegerRange]) -> In
         return TRUTH
     if term.kind == "negative":
         return IntegerRange(-parts[0].high, -parts[0].low)
-    if term.kind == "convert" and term.parts[0].type == BOOL:
-        return parts[0]
     # A mask of ones keeps what is below it, also of negative numbers in two's complement.
     if term.kind == "&" and parts[1].low == parts[1].high and parts[1].low >= 0:
         return IntegerRange(0, parts[1].high)
@@ -205,7 +192,7 @@ def _calculated(function: Function, term: Term, parts: list[IntegerRange]) -> In
 
 
 def _join(names: Names, other: Names) -> None:
-    """Merge the ranges of names of two branches; names assigned in one branch only are not read later."""
+    """Merge the ranges of names at two ends of a loop; names assigned before one of them only are not read later."""
     for name, value in other.items():
         names[name] = hull(names.get(name, value), value)
 
@@ -243,12 +230,8 @@ class _Narrowing:
                 return Row(kind.name, tuple((name, self.type_of(inner, own)) for (name, inner), own in pairs))
             return Items(tuple(self.type_of(*pair) for pair in zip(kind.types, every, strict=True)))
         assert isinstance(value, IntegerRange)
-        width = _width(value)
-        if kind == INT and width is None:
-            raise _refused(
-                self.item, f"a value may range from {value.low} to {value.high}, which does not fit in 32 bits"
-            )
-        return width if kind == INT and width is not None else kind
+        # A value beyond 32 bits was refused with its range.
+        return _width(value) or kind if kind == INT else kind
 
     def of_name(self, name: str, kind: Type) -> Type:
         return self.type_of(kind, self.ranges.names[self.item.name, name])
@@ -262,9 +245,6 @@ class _Narrowing:
                 made.append(typed.Assign(statement.name, converted(self.term(statement.value), kind)))
             elif isinstance(statement, typed.Return):
                 made.append(typed.Return(converted(self.term(statement.value), returns)))
-            elif isinstance(statement, typed.If):
-                bodies = (self.block(inner, returns) for inner in (statement.body, statement.otherwise))
-                made.append(typed.If(self.term(statement.test), *bodies))
             else:
                 assert isinstance(statement, typed.CountedLoop)
                 kind = self.of_name(statement.name, INT)
@@ -299,7 +279,7 @@ class _Narrowing:
     def calculated(self, term: Term, parts: tuple[Term, ...]) -> Term:
         """Return an arithmetic term in the widest type of its operands and value."""
         own = self.type_of(term.type, self.ranges.terms[id(term)]) if isinstance(term.type, Scalar) else term.type
-        if term.kind == "number" or (term.kind == "convert" and parts[0].type == BOOL):
+        if term.kind == "number":
             return replace(term, type=own, parts=parts)
         if term.kind == ">>":
             # An arithmetic shift to the right never leaves the width of what is shifted.

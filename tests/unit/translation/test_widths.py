@@ -32,10 +32,7 @@ def doubled_up(value: int, places: int) -> int:
 def chosen(value: int, places: int) -> int:
     """One of three ways, with a difference that is wider than what it is made of."""
     size = max(value, -value)
-    found = -3
-    if size > places:
-        size = size - places
-        found = size * 4
+    found = (size - places) * 4 if size > places else -3
     return min(found, 1000) if value > 0 else (found >> 2) + (value & 7)
 
 
