@@ -37,9 +37,8 @@ from ppafo.engine.loop_text import write_lanes
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import SimulationError
 from ppafo.golden_bits import GOLDEN, Hashes, digest, golden_hashes, names, plain_batch
-from ppafo.translation.c99 import program_source, translated
 from ppafo.translation.native import compiler
-from scripts.built_programs import build, run_native
+from scripts.built_programs import build, program_source, run_native, translated
 from scripts.golden_bits import Runner, drawn_batch, failures, hashes_of, new_golden_hashes
 from scripts.other_machines import MACHINES, on_other_machine
 from tests.composed_programs import drawn_programs

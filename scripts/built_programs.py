@@ -5,15 +5,31 @@ from pathlib import Path
 from types import ModuleType
 
 from ppafo.engine.compilers import FLAGS
-from ppafo.engine.entries import entry_text
+from ppafo.engine.entries import INLINE, entry_text
 from ppafo.engine.lane_rows import LOOP, lanes_of
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, join_results
+from ppafo.engine.loop_text import write_lanes
+from ppafo.engine.program import Program
+from ppafo.engine.source_text import SourceCollector
+from ppafo.translation.c99 import c_source, documents_of
 from ppafo.translation.compiling import compile_library
 from ppafo.translation.native import LIBRARY_FILE
 from ppafo.translation.native_entries import Parameters, fill_module, parameters_of
 from ppafo.translation.native_source import with_packed_entries
+from ppafo.translation.walk import walk_module
 
 _LANE_LOOP = parameters_of(entry_text("advance", LOOP, ()))
+
+
+def program_source(program: Program) -> str:
+    """C of a program, whose function ``advance`` advances a block of runs. ProgramError for code without C."""
+    collector = SourceCollector(INLINE)
+    return translated(write_lanes(program, collector), collector)
+
+
+def translated(composed: str, collector: SourceCollector) -> str:
+    """C of a composed module whose definitions are in ``collector``."""
+    return c_source(walk_module(composed), documents_of(collector), "Generated from the functions of ppafo.")
 
 
 def build(

@@ -19,9 +19,8 @@ import numpy as np
 from ppafo.engine.compilers import FLAGS, Effort
 from ppafo.engine.lanes import Batch, BatchResult
 from ppafo.errors import SimulationError
-from ppafo.translation.c99 import program_source
 from ppafo.translation.native import compiler
-from scripts.built_programs import run_native
+from scripts.built_programs import program_source, run_native
 
 DRIVER = r"""
 #include <stdio.h>

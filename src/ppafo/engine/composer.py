@@ -68,7 +68,7 @@ class Composer(ast.NodeTransformer):
         self.function, self.module, self.add_inside = function, module, add_inside
         names = function.__code__.co_varnames
         self.local = frozenset(names if local is None else local)
-        self.parameters = frozenset(_parameters(function.__code__)) if local is None else self.local
+        self.parameters = frozenset(_parameters(function)) if local is None else self.local
         self.rows = rows or {}
         if known is None:
             parts = parts_of(function)
@@ -162,15 +162,11 @@ class Composer(ast.NodeTransformer):
             self.generic_visit(node)
             return node
         called, node = self.with_parts(called, node)
-        defaults: list[ast.expr] = []
-        if isinstance(called, FunctionType) or is_row(called):
-            defaults = self.default_arguments(called, node)
         function = self.composed_value(called, node.func)
         arguments = [*self.rows_for(function, node), *(self.visit(argument) for argument in node.args)]
-        if not defaults:
-            named = [ast.keyword(keyword.arg, self.visit(keyword.value)) for keyword in node.keywords]
-            return ast.Call(function, arguments, named)
-        return ast.Call(function, [*arguments, *defaults], [])
+        if is_row(called) or (isinstance(called, FunctionType) and not is_step_function(called)):
+            return ast.Call(function, [*arguments, *self.further_arguments(called, node)], [])
+        return ast.Call(function, arguments, [ast.keyword(one.arg, self.visit(one.value)) for one in node.keywords])
 
     def with_parts(self, called: Any, node: ast.Call) -> tuple[Any, ast.Call]:
         """Return a function called with ``parts=`` as a function bound to these parts, and the call without ``parts``.
@@ -209,16 +205,15 @@ class Composer(ast.NodeTransformer):
             )
         return composed
 
-    def default_arguments(self, called: Any, node: ast.Call) -> list[ast.expr]:
-        """Fields of a NamedTuple after the positional arguments, if some have default values; else none.
+    def further_arguments(self, called: Any, node: ast.Call) -> list[ast.expr]:
+        """Arguments of a function or fields of a NamedTuple after the positional ones, named or by default.
 
         Raises ProgramError if the arguments do not match.
         """
-        if is_step_function(called) or any(isinstance(argument, ast.Starred) for argument in node.args):
-            return []  # its groups are handed over by name; how many there are is known only to the compiler
-        is_function = isinstance(called, FunctionType)
-        takes: tuple[str, ...] = _parameters(called.__code__) if is_function else called._fields
-        if len(node.args) == len(takes) and not node.keywords and not (is_function and called.__kwdefaults__):
+        if any(isinstance(argument, ast.Starred) for argument in node.args):
+            return []  # how many there are is known only to the compiler, which refuses them
+        takes: tuple[str, ...] = called._fields if is_row(called) else _parameters(called)
+        if len(node.args) == len(takes) and not node.keywords:
             return []
         named = {keyword.arg: keyword.value for keyword in node.keywords if keyword.arg is not None}
         try:
@@ -227,10 +222,10 @@ class Composer(ast.NodeTransformer):
             unknown = next((name for name in named if name not in takes), None)
             problem = f"has no '{unknown}'{nearest_name(unknown, takes)}" if unknown else str(error)
             raise self.refuse(node, f"{called.__name__}({', '.join(takes)}): {problem}") from error
-        if is_function or len(node.args) + len(named) == len(takes):
-            return []
+        signature = inspect.signature(called).parameters
+        # The values with which Python calls the function: the text of a default may mean something else by now.
         return [
-            self.visit(named[name]) if name in named else self.literal(called._field_defaults[name], node, name)
+            self.visit(named[name]) if name in named else self.literal(signature[name].default, node, "a default")
             for name in takes[len(node.args) :]
         ]
 
@@ -373,6 +368,8 @@ class Composer(ast.NodeTransformer):
         )
 
 
-def _parameters(code: types.CodeType) -> tuple[str, ...]:
-    """Names of the parameters of a function."""
-    return code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
+def _parameters(function: FunctionType) -> tuple[str, ...]:
+    """Names of the parameters of a function in the module, in which no bound ``parts`` are left."""
+    code = function.__code__
+    names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
+    return names if parts_of(function) is None else tuple(name for name in names if name != "parts")

@@ -25,7 +25,7 @@ from ppafo.engine.compilers import Effort
 from ppafo.engine.entries import INLINE
 from ppafo.engine.groups import Role, check_rows
 from ppafo.engine.lane_rows import VECTOR, lanes_of
-from ppafo.engine.loading import HOW_TO_INSTALL, compiled, compilers_to_try, runs_by_python
+from ppafo.engine.loading import HOW_TO_INSTALL, compiled, compilers_to_try
 from ppafo.engine.package_key import package_key
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import MadeFrom, SourceCollector
@@ -125,8 +125,7 @@ def load_program(program: Program, effort: Effort = Effort.FULL) -> RunnableProg
     The text is regenerated if a number or function used in it has changed. The text is also generated if Python runs
     the program, so that code which cannot be compiled is refused with the same message on every computer.
     """
-    source = _current_source(program)
-    module = None if runs_by_python() else compiled(source, effort)
+    module = compiled(current_source("lanes", program, write_source), effort)
     if module is not None:
         return module
     from ppafo.engine.interpreter import PythonProgram  # most computers have a compiler
@@ -141,12 +140,8 @@ def load_programs(programs: Iterable[tuple[Program, Effort]]) -> None:
     if compilers:
         from ppafo.engine.cache.making import load_all  # most runs have one program
 
-        load_all([(_current_source(program), effort) for program, effort in different], compilers[0], compiled)
-
-
-def _current_source(program: Program) -> str:
-    """Return the source of a program, regenerated if out of date."""
-    return current_source("lanes", program, write_source)
+        sources = [(current_source("lanes", program, write_source), effort) for program, effort in different]
+        load_all(sources, compilers[0], compiled)
 
 
 def current_source(kind: str, parts: Any, write: Any) -> str:

@@ -78,7 +78,10 @@ def compiled(source: str, effort: Effort = Effort.FULL) -> ModuleType | None:
     A quick program is not compiled if the fully optimised one is cached. Raises ProgramError for a mistake in the text,
     and SimulationError if the compiler named by ``PPAFO_BACKEND`` does not work.
     """
-    return None if runs_by_python() else _load_by(source, compilers_to_try(), effort)
+    compilers = compilers_to_try()
+    if not compilers and os.environ.get(BACKEND_VARIABLE) != PYTHON:
+        _say_slow(f"no working C compiler was found; {HOW_TO_INSTALL}")
+    return _load_by(source, compilers, effort)
 
 
 def load_generated(source: str, compiler: Compiler) -> ModuleType:
@@ -104,15 +107,6 @@ def load_generated(source: str, compiler: Compiler) -> ModuleType:
         from ppafo.engine.cache.making import make  # most programs are there
 
         return make(program, folder)
-
-
-def runs_by_python() -> bool:
-    """Return whether no compiler is available or Python was selected; a missing compiler is logged."""
-    if compilers_to_try():
-        return False
-    if os.environ.get(BACKEND_VARIABLE) != PYTHON:
-        _say_slow(f"no working C compiler was found; {HOW_TO_INSTALL}")
-    return True
 
 
 @lru_cache(maxsize=64)

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from types import CodeType, FunctionType
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from ppafo.engine.composer import is_step_function
 from ppafo.engine.entries import rewritten
@@ -67,25 +67,6 @@ class Effects:
     def results(self) -> list[str]:
         """Names of the returned values."""
         return [*self.groups, *self.slots]
-
-
-class StepModule(Protocol):
-    """Module of one program, for which functions of the step are reduced."""
-
-    parts: Any
-    """Components of the device."""
-    collector: Any
-    """Text of the module, a ``SourceCollector``."""
-    rows: dict[str, Any]
-    """Classes of all groups that have rows."""
-    placeholders: dict[str, Any]
-    """Known values in reduced functions, by their placeholder names."""
-
-    def effects_of(self, function: FunctionType) -> Effects:
-        """Return the groups that an added function of the step reads and sets."""
-
-    def add_called(self, inside: FunctionType, called: FunctionType) -> str:
-        """Add a function called by another function; return its name in the module."""
 
 
 _COMPREHENSIONS = ast.GeneratorExp | ast.ListComp | ast.SetComp | ast.DictComp
@@ -164,9 +145,9 @@ def _definitions(file: str) -> dict[int, ast.FunctionDef]:
 
 
 class Reduction:
-    """Reduction of one function, for the ``parts`` of the step or for others."""
+    """Reduction of one function for a ``StepText``, and for its ``parts`` or for others."""
 
-    def __init__(self, module: StepModule, function: FunctionType, parts: Any = None) -> None:
+    def __init__(self, module: Any, function: FunctionType, parts: Any = None) -> None:
         self.module, self.function = module, function
         self.definition = definition_of(function)
         self.scope: dict[str, Any] = function.__globals__

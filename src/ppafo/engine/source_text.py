@@ -156,27 +156,21 @@ class SourceCollector:
         named = dict(function.__kwdefaults__ or {})
         self.made_from.functions.append(_ComposedFrom(function, function.__code__, function.__defaults__, named))
         composer = Composer(function, self, self.add_inside)
-        tree.args.kwonlyargs = [argument for argument in tree.args.kwonlyargs if argument.arg not in composer.known]
         own_rows = self.replacements.rows.get(function, ())
+        taken = [*tree.args.posonlyargs, *tree.args.args, *tree.args.kwonlyargs]
+        names = [argument.arg for argument in taken if argument.arg not in composer.known]
         # Rows of effects come first in every function, so that callers can hand them over without knowing the rest.
-        tree.args.args.sort(key=lambda argument: argument.arg not in own_rows)
-        for argument in (*tree.args.posonlyargs, *tree.args.args, *tree.args.kwonlyargs):
-            argument.annotation = None
-        # The values with which Python calls the function: the text of a default may mean something else by now.
-        tree.args.defaults = [composer.literal(value, tree, "a default") for value in function.__defaults__ or ()]
-        tree.args.kw_defaults = [
-            composer.literal(named[argument.arg], tree, "a default") if argument.arg in named else None
-            for argument in tree.args.kwonlyargs
-        ]
+        names.sort(key=lambda name: name not in own_rows)
         body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body
         tree.name, tree.returns = name, None
         tree.body = [composer.visit(statement) for statement in body]
         # Rows of called functions for which this function has no parameter are passed on by its callers.
         passed_on = sorted(composer.rows_to_receive)
-        parameters = [*map(ast.arg, passed_on), *tree.args.args]
         if own_rows or passed_on:
-            self.needs[name] = (*passed_on, *(argument.arg for argument in parameters if argument.arg in own_rows))
-        tree.args.args = parameters
+            self.needs[name] = (*passed_on, *(row for row in names if row in own_rows))
+        # Every call gives all arguments in their order, also those that have a default value.
+        every = [ast.arg(parameter) for parameter in (*passed_on, *names)]
+        tree.args = ast.arguments([], every, None, [], [], None, [])
         return self.decorated(tree, function.__code__.co_filename)
 
     def add_inside(self, function: Any, called: Any) -> str:

@@ -1,14 +1,13 @@
 """Integer controller of a scenario: law, numbers, converter and sample period, and its decisions in Python."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 from ppafo.control.catalog import FIXED_POINT
-from ppafo.engine.rows import leaves, rebuilt
+from ppafo.engine.composer import each
 from ppafo.errors import ScenarioError
 from ppafo.model.controlled import TORQUE
-from ppafo.processor.fixed_point import SETTINGS, ConverterCounts, ConverterLimits, CountResolution
+from ppafo.processor.fixed_point import SETTINGS, ConverterCounts, CountResolution
 from ppafo.processor.torque_laws.law import FixedLaw
 from ppafo.processor.torque_laws.on_off import DEAD_ZONE, ON_OFF
 from ppafo.processor.torque_laws.pid import PID
@@ -25,13 +24,12 @@ MOST_TICKS = 32767
 
 
 class FixedPointController(NamedTuple):
-    """Integer controller: scenario, law, integers by name, converter resolution and limits, timer ticks per sample."""
+    """Integer controller: scenario, law with its integers, converter resolution, timer ticks per sample."""
 
     scenario: Scenario
     law: FixedLaw
-    numbers: Mapping[str, float]
+    numbers: Any
     steps: CountResolution
-    limits: ConverterLimits
     ticks: int
 
 
@@ -54,10 +52,7 @@ def fixed_point_controller(scenario: Scenario) -> FixedPointController:
             f"{scenario.name}: effects.opening: the firmware inverts no table of openings; omit the table"
         )
     row = run.controller
-    numbers = dict(zip((quantity.name for quantity in law.number_quantities), leaves(row.numbers), strict=True))
-    return FixedPointController(
-        scenario=scenario, law=law, numbers=numbers, steps=row.steps, limits=row.numbers.limits, ticks=ticks
-    )
+    return FixedPointController(scenario, law, each(int, row.numbers), row.steps, ticks)
 
 
 def integer_form(scenario: Scenario) -> Scenario:
@@ -90,8 +85,7 @@ class PythonProcessor:
 
     def __init__(self, fixed: FixedPointController) -> None:
         self.law = fixed.law
-        numbers = [int(fixed.numbers[quantity.name]) for quantity in fixed.law.number_quantities]
-        self.numbers: Any = rebuilt(fixed.law.numbers, numbers)
+        self.numbers = fixed.numbers
         self.state: Any = fixed.law.begins
 
     def begin(self) -> None:

@@ -7,7 +7,7 @@ import re
 from typing import Any, get_type_hints
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.engine.rows import is_row, rebuilt
+from ppafo.engine.rows import is_row, leaves, rebuilt
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.exports import filled, in_markdown, template
@@ -134,7 +134,7 @@ def _typed_row(kind: Any, collector: SourceCollector) -> Row:
 def firmware(scenario: Scenario) -> dict[str, bytes]:
     """Return the firmware files of a controller by name. Raises ScenarioError without an integer form."""
     fixed = fixed_point_controller(scenario)
-    scenario, steps, (top, middle) = fixed.scenario, fixed.steps, fixed.limits
+    scenario, steps, (top, middle) = fixed.scenario, fixed.steps, fixed.numbers.limits
     words = {
         "title": scenario.name,
         "description": in_markdown(scenario.description),
@@ -178,8 +178,7 @@ def parameters_header(fixed: FixedPointController) -> str:
         f"#define CONTROLLER_TICKS {fixed.ticks}u /* of 125 us in a sample period of {control.period:.9g} s */",
         f"#define CONTROLLER_BITS {int(control.settings[SETTINGS[0].name])} /* of the converter */",
     ]
-    for quantity in law.number_quantities:
-        number = int(fixed.numbers[quantity.name])
+    for quantity, number in zip(law.number_quantities, leaves(fixed.numbers), strict=True):
         lines.append(
             f"#define {macro(quantity)} {number} /* {quantity.summary}; {quantity.minimum:g} to {quantity.maximum:g} */"
         )

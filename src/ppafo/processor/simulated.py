@@ -55,7 +55,7 @@ def try_firmware(scenario: Scenario, samples: int, seed: int = 1) -> FirmwareTri
     Raises ScenarioError if the controller has no integer form, SimulationError if a tool is missing or fails.
     """
     fixed = fixed_point_controller(scenario)
-    drawn = list(drawn_readings(int(fixed.limits.top), samples, seed))
+    drawn = list(drawn_readings(fixed.numbers.limits.top, samples, seed))
     printed = _printed_by_mspdebug(firmware(scenario), drawn)
     found, cycles = _decisions(printed)
     processor, expected = PythonProcessor(fixed), []

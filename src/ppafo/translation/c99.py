@@ -14,16 +14,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.resources import files
 
-from ppafo.engine.entries import INLINE
-from ppafo.engine.loop_text import write_lanes
-from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
 from ppafo.translation import typed
 from ppafo.translation.c_terms import PART, CTerms, c_name, member_name
 from ppafo.translation.scopes import Scopes
 from ppafo.translation.typed import Function, Module, Statement, Term
 from ppafo.translation.value_types import BOOL, FLOAT, Array, Items, Row, RowReference, Scalar, Type, is_empty, types_in
-from ppafo.translation.walk import walk_module
 
 WIDTH = 118
 TIED = "\N{NO-BREAK SPACE}"
@@ -41,22 +37,6 @@ PPAFO_INLINE ppafo_array {PART}(ppafo_array whole, int64_t first, int64_t beyond
 """
 LANE = "lane"
 """Name of a loop variable with independent iterations, for which a compiler pragma is emitted."""
-
-
-def program_source(program: Program) -> str:
-    """Return the C translation unit of a program; its function ``advance`` advances a block of runs.
-
-    Raises ProgramError, with file and line, for code outside the supported subset of Python.
-    """
-    collector = SourceCollector(INLINE)
-    return translated(write_lanes(program, collector), collector)
-
-
-def translated(composed: str, collector: SourceCollector) -> str:
-    """Return the C translation unit of a composed module whose definitions are in ``collector``."""
-    return c_source(
-        walk_module(composed), documents_of(collector), "Generated from the functions of ppafo. Not to be edited."
-    )
 
 
 def documents_of(collector: SourceCollector) -> dict[str, str]:

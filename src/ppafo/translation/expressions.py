@@ -341,29 +341,19 @@ class Expressions:
     def called(self, name: str, node: ast.Call) -> tuple[Function, tuple[Term, ...]]:
         """Return the called function of the module, with its arguments."""
         definition = self.definitions[name]
-        takes = definition.args
-        names = [argument.arg for argument in (*takes.posonlyargs, *takes.args, *takes.kwonlyargs)]
-        positional = [argument.arg for argument in (*takes.posonlyargs, *takes.args)]
-        defaults = dict(zip(positional[::-1], takes.defaults[::-1], strict=False))
-        defaults |= {
-            argument.arg: value for argument, value in zip(takes.kwonlyargs, takes.kw_defaults, strict=True) if value
-        }
-        values = {name: self.term(value) for name, value in defaults.items()}
-        # Defaults first, then arguments by place, then by name: the last one holds.
-        values |= dict(zip(names, map(self.term, node.args), strict=False))
-        values |= {str(keyword.arg): self.term(keyword.value) for keyword in node.keywords}
+        names, values = [argument.arg for argument in definition.args.args], list(map(self.term, node.args))
         # Calls between functions were checked when they were composed; this is a call of the engine's own.
-        missing = [name for name in names if name not in values]
-        if missing or len(node.args) > len(positional) or len(values) > len(names):
+        if len(values) != len(names) or node.keywords:
+            missing = names[len(values) :]
             problem = f"missing a required argument: '{missing[0]}'" if missing else "too many arguments"
             called = f"({', '.join(map(ast.unparse, node.args))})"
             problem = f"{{name}}({', '.join(names)}): the engine calls it with {called}: {problem}"
             raise self.mistaken(definition, problem)
-        types = tuple(values[name].type for name in names)
+        types = tuple(value.type for value in values)
         # An array of known shape is a local one, which C hands over as a pointer of another type.
         if any(isinstance(kind, Array) and kind.shape for kind in types):
             raise self.refused(node, f"'{ast.unparse(node)}' must not pass a local array")
-        return self.made(name, types), tuple(values[name] for name in names if not is_empty(values[name].type))
+        return self.made(name, types), tuple(value for value in values if not is_empty(value.type))
 
     def built_in(self, name: str, node: ast.Call) -> Term:
         """Return the term of a call to a built-in function of every target language."""

@@ -157,8 +157,7 @@ class _FunctionWalk:
 
     def walked(self, name: str, types: tuple[Type, ...]) -> Function:
         """Return the translated function with typed statements."""
-        parameters = self.definition.args
-        names = [argument.arg for argument in (*parameters.posonlyargs, *parameters.args, *parameters.kwonlyargs)]
+        names = [argument.arg for argument in self.definition.args.args]
         self.types.update(zip(names, types, strict=True))
         # A name that gets a wider type further down, as in a loop, has it from the beginning: the body is translated
         # again until no type changes, which ends because types only widen.
@@ -223,8 +222,7 @@ class _FunctionWalk:
         return [typed.ProcedureCall(function.name, arguments)]
 
     def do_return(self, node: ast.Return) -> list[Statement]:
-        if node.value is None:
-            raise self.refused(node, "'return' needs a value")
+        assert node.value is not None, "a function that returns nothing is refused where it is composed"
         value = self.values.term(node.value)
         kind = value.type if self.returns is None else joined(self.returns, value.type)
         if kind is None:

@@ -84,17 +84,18 @@ def test_bound_methods_partial_functions_and_objects_are_refused(write: Write) -
 
 
 def test_defaults_are_those_that_the_function_has(write: Write) -> None:
-    module = write("GAIN = 2.0\n\n\ndef law(x, gain=GAIN, *, offset=GAIN):\n    return gain * x + offset * GAIN\n")
+    text = "GAIN = 2.0\n\n\ndef law(x, gain=GAIN, *, offset=GAIN):\n    return gain * x + offset * GAIN\n\n\n"
+    module = write(f"{text}def called(x):\n    return law(x) + law(x, offset=x)\n")
     module.GAIN = 100.0
-    assert generated(module.law)(1.0) == module.law(1.0) == 202.0
+    assert generated(module.called)(1.0) == module.called(1.0) == 304.0
     module.law.__defaults__ = (7.0,)
     module.law.__kwdefaults__ = {"offset": -0.5}
-    assert generated(module.law)(1.0) == module.law(1.0) == -43.0
+    assert generated(module.called)(1.0) == module.called(1.0) == 64.0
 
 
 def test_a_default_that_is_no_constant_is_refused(write: Write) -> None:
-    module = write("def law(x, gains=[1.0]):\n    return x\n")
-    assert "a default must be a number" in refused(module.law)
+    module = write("def law(x, gains=[1.0]):\n    return x\n\n\ndef called(x):\n    return law(x)\n")
+    assert "a default must be a number" in refused(module.called)
 
 
 def test_a_function_redefined_under_one_name_is_refused_beside_the_first(write: Write) -> None:

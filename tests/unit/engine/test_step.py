@@ -17,7 +17,7 @@ from ppafo.engine.run import batch_of
 from ppafo.engine.step import foot, gas, lines, meters, phases, sample, stated, walk
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.translation.c99 import program_source
+from scripts.built_programs import program_source
 
 MODULES: list[ModuleType] = [*(foot, gas, lines, meters, phases, sample, stated, walk)]
 

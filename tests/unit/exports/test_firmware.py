@@ -100,7 +100,7 @@ def test_the_c_of_a_law_decides_as_python_does_under_the_sanitizer(tmp_path: Pat
         build_firmware(tmp_path, goal)
     fixed = PythonProcessor(fixed_point_controller(scenario))
     lines, wanted = [], []
-    for number, readings in enumerate(drawn_readings(int(fixed_point_controller(scenario).limits.top), 20_000, 5)):
+    for number, readings in enumerate(drawn_readings(fixed.numbers.limits.top, 20_000, 5)):
         if number % 200 == 0:
             fixed.begin()
             lines.append("begin")

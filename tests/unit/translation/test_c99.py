@@ -16,13 +16,13 @@ from ppafo.engine.lanes import run_batch
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.simulation.plan import plan_run
-from ppafo.translation.c99 import c_source, program_source
+from ppafo.translation.c99 import c_source
 from ppafo.translation.native_entries import parameters_of
 from ppafo.translation.walk import walk_module
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import with_duration
 from scripts.bits import digest, drawn_batch, failures, plain_batch
-from scripts.built_programs import build, run_native
+from scripts.built_programs import build, program_source, run_native
 from tests.composed_programs import drawn_programs
 
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Werror", "-fsyntax-only", "-ffp-contract=off")

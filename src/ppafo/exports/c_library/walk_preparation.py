@@ -92,8 +92,10 @@ def put_walking_leg_on(parts: Preparation, lane: PreparedLane, settings: Any) ->
     lane.plant = with_leg(lane["bare"], lane.leg)
     lane.gait = parts.constant(gait_series(gait))
     lane.gait_timing = parts.constant(gait_timing(gait))
-    numbers_of_sensors = section_row(parts.row("SensorNumbers", (*_FORCES, *_OTHERS)), settings, "sensors")
-    lane.gait_sensors = gait_sensors(numbers_of_sensors, settings["controller.period"])
+    lane.gait_sensors = gait_sensors(
+        section_row(parts.row("SensorNumbers", (*_FORCES, *_OTHERS)), settings, "sensors"),
+        settings["controller.period"],
+    )
 
 
 def count_walk_steps(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
