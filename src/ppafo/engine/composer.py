@@ -182,7 +182,7 @@ class Composer(ast.NodeTransformer):
         others = [keyword for keyword in node.keywords if keyword is not given]
         # An argument handed on as a phase gave it is the same in the whole program.
         frame = frame_of(self.function)
-        is_own = frame is None or frame.function.__name__ == self.function.__name__
+        is_own = frame is None or frame.__name__ == self.function.__name__
         is_same = is_own and parts is parts_of(self.function)
         name = called.__name__ if is_same else f"{called.__name__}_of_{self.function.__name__}"
         return made_of(called, name, parts), ast.copy_location(ast.Call(node.func, node.args, others), node)

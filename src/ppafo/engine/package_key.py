@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from ppafo.engine.rows import is_row
 from ppafo.engine.source_text import MadeFrom, NameRead
-from ppafo.model.binding import frame_of
+from ppafo.model.binding import frame_of, parts_of
 
 COMPOSED = ("control", "engine", "metrics", "model", "processor", "signals")
 """Subpackages with functions that become part of a program text, or that compose the text."""
@@ -144,7 +144,7 @@ def _named(value: Any) -> str:
         return ".".join(names)
     frame = frame_of(value) if isinstance(value, FunctionType) else None
     if frame is not None:
-        return f"{'.'.join(names)}({_named(frame.function)}; {_described(frame.parts)})"
+        return f"{'.'.join(names)}({_named(frame)}; {_described(parts_of(value))})"
     if is_row(value):
         # Made of others, such as the settings of a law with those of its estimator: its fields are all of it.
         kinds = (_named(kind) if is_row(kind) else repr(kind) for kind in value.__annotations__.values())

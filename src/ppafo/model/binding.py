@@ -6,16 +6,9 @@ of further parts, and calls ``parts.NAME(...)``. ``made_of`` binds the parts; th
 
 import types
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 from ppafo.model.declaration import PlainFunction
-
-
-class Frame(NamedTuple):
-    """Origin of a function with bound parts: the original function, and the parts."""
-
-    function: PlainFunction
-    parts: Any
 
 
 def is_made_of(value: object) -> bool:
@@ -25,9 +18,9 @@ def is_made_of(value: object) -> bool:
     return any(isinstance(part, types.FunctionType | type) or is_made_of(part) for part in value)
 
 
-def frame_of(function: PlainFunction) -> Frame | None:
-    """Return the original function and parts of a function made by ``made_of``; None for any other function."""
-    found: Frame | None = vars(function).get("frame")
+def frame_of(function: PlainFunction) -> PlainFunction | None:
+    """Return the original function of a function made by ``made_of``; None for any other function."""
+    found: PlainFunction | None = vars(function).get("frame")
     return found
 
 
@@ -49,5 +42,5 @@ def made_of(frame: PlainFunction, name: str, parts: tuple[Any, ...]) -> PlainFun
     made = types.FunctionType(function.__code__, function.__globals__, name, function.__defaults__)
     made.__kwdefaults__ = {**(function.__kwdefaults__ or {}), "parts": parts}
     made.__qualname__, made.__module__, made.__annotations__ = name, frame.__module__, function.__annotations__
-    vars(made)["frame"] = Frame(frame, parts)
+    vars(made)["frame"] = frame
     return made
