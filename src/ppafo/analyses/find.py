@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 ScenarioLike = Annotated["Scenario | str | Path", Word("SCENARIO", help="name of a scenario, or a .toml file")]
 VariedRange = Annotated[str, Word("PATH=LOW..HIGH", option="--vary")]
 Condition = Annotated[str, Word("CONDITION", option="--such-that")]
-Highest = Annotated[bool, Word(off="--lowest", help="find the lowest value (default)")]
 ACCURACY = 1.0e-6
 """Width of the last bracket, as a fraction of the range of values [-]."""
 FOLLOWS = "follows"
@@ -76,7 +75,7 @@ def find(
     *,
     vary: VariedRange,
     such_that: Condition,
-    highest: Highest = False,
+    highest: bool = False,
     grid: Count = 64,
     overrides: Overrides = (),
     threads: Threads | None = None,
@@ -94,7 +93,7 @@ def find(
         vary: a number of the scenario or its device, and its range, for example 'supply.pressure=20..90 psi_g'
         such_that: a metric, <= or >=, and a limit, for example 'final_error <= 0.3 N m', or 'follows': the
             run follows a reference that the actuator can give
-        highest: find the highest value
+        highest: find the highest value; default: the lowest
         grid: number of evenly spaced values to try first; default 64
         overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated
         threads: number of threads; default: all cores

@@ -158,8 +158,8 @@ class Word:
     ``metavar`` is the name in the help. ``read`` converts the text to the value. ``take`` converts a Python value, with
     a ValueError for an unsuitable one, and ``what`` describes the accepted values; without ``take`` the annotated type
     decides. ``option`` is the name of the option if different from the parameter; it also makes an option of a
-    parameter that Python passes by position. ``help`` is the default help text. ``off`` is the option that clears a
-    flag. ``is_repeated`` marks several values whose type is not just a sequence.
+    parameter that Python passes by position. ``help`` is the default help text. ``is_repeated`` marks several values
+    whose type is not just a sequence.
     """
 
     metavar: str = ""
@@ -168,5 +168,4 @@ class Word:
     what: str = ""
     option: str = ""
     help: str = ""
-    off: str = ""
     is_repeated: bool = False

@@ -223,12 +223,7 @@ def _add_parameter(
     if option:
         options["dest"] = parameter.name
     if reading.is_flag:
-        either = parser.add_mutually_exclusive_group()
-        either.add_argument(option, action="store_true", **options)
-        if word.off:
-            either.add_argument(
-                word.off, action="store_false", dest=parameter.name, default=default, help=word.help.replace("%", "%%")
-            )
+        parser.add_argument(option, action="store_true", **options)
         return
 
     def read(text: str) -> Any:

@@ -228,27 +228,19 @@ def read_mapped_matlab(file: _MatlabFile, columns: ColumnMap, map_name: str) -> 
 
     Raises DataError with the key of a channel whose variable is absent or unusable, and with the map if it has a name.
     """
-    numbers: dict[str, Floats] = {}
-    clock: list[str] | None = None
-    dates: list[str] | None = None
     with in_map(map_name):
-        faults = list[PpafoError]()
+        faults, named = list[PpafoError](), dict[str, str]()
         for name, mapped in columns.channels.items():
             with noted_in(faults):
-                if mapped.column is None:
-                    continue
-                variable = _variable(f"channels.{name}.column", mapped.column, file)
-                if name == TIME and variable in file.texts:
-                    clock = file.texts[variable]
-                else:
-                    numbers[name] = file.columns[variable]
+                if mapped.column is not None:
+                    named[name] = _variable(f"channels.{name}.column", mapped.column, file, is_text=name == TIME)
         raise_noted(faults)
-        date = columns.channels[TIME].date
+        date, clock = columns.channels[TIME].date, file.texts.get(named.get(TIME, ""))
+        dates = None
         if date is not None:
-            dates = file.texts.get(_variable(f"channels.{TIME}.date", date, file))
-        lengths = {name: values.size for name, values in numbers.items()}
-        if clock:
-            lengths[TIME] = len(clock)
+            dates = file.texts.get(_variable(f"channels.{TIME}.date", date, file, is_text=True))
+        numbers = {name: file.columns[each] for name, each in named.items() if name != TIME or clock is None}
+        lengths = {name: values.size for name, values in numbers.items()} | ({TIME: len(clock)} if clock else {})
         if len(set(lengths.values())) != 1:
             listed = ", ".join(f"channels.{name} has {length}" for name, length in lengths.items())
             raise DataError(f"all channels need columns of the same length: {listed or 'no channel has a column'}")
@@ -263,7 +255,7 @@ def read_mapped_matlab(file: _MatlabFile, columns: ColumnMap, map_name: str) -> 
     )
 
 
-def _variable(key: str, column: int | str, file: _MatlabFile) -> str:
+def _variable(key: str, column: int | str, file: _MatlabFile, is_text: bool) -> str:
     """Return the variable that a map names at ``key``; a number selects a column of the file's only matrix."""
     if isinstance(column, int):
         matrices = sorted({name.partition("(")[0] for name in file.columns if "(:," in name and "." not in name})
@@ -273,8 +265,8 @@ def _variable(key: str, column: int | str, file: _MatlabFile) -> str:
             )
         column = f"{matrices[0]}(:,{column})"
     name = re.sub(r"\s+", "", column) if "(" in column else column
-    if name not in file.columns and name not in file.texts:
-        known = (*file.columns, *file.texts)
+    known = (*file.columns, *(file.texts if is_text else ()))
+    if name not in known:
         raise DataError(
             f"{key} = {column!r}: the file has no such variable{nearest_name(name, known)}; available: "
             f"{shown_names(known)}{file.advice_on_objects()}"

@@ -256,7 +256,7 @@ def test_times_of_day_and_rates_with_variables_of_matlab(matlab: Path) -> None:
     ("column", "message"),
     [
         ("p11", "channels.pressure_1.column = 'p11': the file has no such variable, did you mean 'p1'"),
-        ("scale", "; available: "),
+        ("cells", "; available: "),
     ],
 )
 def test_a_variable_that_is_not_there_is_named_with_its_key(matlab: Path, column: str, message: str) -> None:
