@@ -2,7 +2,7 @@
 
 import contextlib
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 _LONG_WORD = re.compile(r"([^\s/\\]{60})[^\s/\\]{40,}|(\S{200})\S{400,}")
 """Word longer than any that this package writes: a name or a value of somebody else."""
@@ -85,19 +85,6 @@ def refused_as(kind: Callable[[str], PpafoError], place: object, *caught: type[E
         yield
     except caught as error:
         raise kind(f"{place}: {error}") from error
-
-
-def check_all(chains: Iterable[Sequence[Callable[[], None]]]) -> None:
-    """Run all checks; raise a PpafoError of the class of the first fault, with the messages of all faults.
-
-    Each check of a chain relies on the previous ones and is skipped once one of them has failed.
-    """
-    found: list[PpafoError] = []
-    for chain in chains:
-        with noted_in(found):
-            for check in chain:
-                check()
-    raise_noted(found)
 
 
 @contextlib.contextmanager

@@ -24,7 +24,7 @@ from ppafo.errors import DataError, StudyError, UnitError, at_fault, refused_as
 from ppafo.report.kind import YES_OR_NO, of_stored_metric
 from ppafo.report.style import font_size
 from ppafo.signals.recording import CHANNELS
-from ppafo.storage.parquet import TableColumn, as_numpy, encode_texts, matrix_of, parquet_bytes, table_of
+from ppafo.storage.parquet import as_numpy, encode_texts, matrix_of, parquet_bytes
 from ppafo.study.blocks import MAXIMUM_RUNS_OF_CHUNK, samples_of
 from ppafo.study.runs import joined
 from ppafo.study.store import (
@@ -321,10 +321,8 @@ def _bands_file(study: Study, results: StudyResults) -> bytes:
         "time": ("s", "time since the start"),
         "runs": ("-", "completed runs, without a fall so far"),
     }
-    columns = {
-        name: TableColumn(values, *said.get(name, (unit, "quantile over runs"))) for name, values in rows.items()
-    }
-    return parquet_bytes(table_of(columns, {"study": study.name}))
+    columns = {name: (values, *said.get(name, (unit, "quantile over runs"))) for name, values in rows.items()}
+    return parquet_bytes(columns, {"study": study.name})
 
 
 def sorted_quantiles(ordered: ask.Floats, counts: NDArray[np.int64], fractions: Sequence[float]) -> ask.Floats:

@@ -72,7 +72,6 @@ Length = Annotated[float, _quantity_word("LENGTH", "m", ABOVE_ZERO)]
 FigureWidth = Annotated[float, _quantity_word("WIDTH", "m", NumberRange(lowest=0.06, highest=0.4))]
 Time = Annotated[float, _quantity_word("TIME", "s")]
 Duration = Annotated[float, _quantity_word("TIME", "s", FROM_ZERO)]
-Torque = Annotated[float, _quantity_word("TORQUE", "N m", ABOVE_ZERO)]
 Pressure = Annotated[float, _quantity_word("PRESSURE", "Pa_a", ABOVE_ZERO)]
 Flow = Annotated[float, _quantity_word("FLOW", "kg/s", ABOVE_ZERO)]
 Volume = Annotated[float, _quantity_word("VOLUME", "m^3", ABOVE_ZERO)]
@@ -111,7 +110,6 @@ MaximumFailed = Annotated[
     ),
 ]
 Fraction = Annotated[float, fraction_word()]
-Side = Annotated[str, Word("right|left", help="which foot; default right")]
 Metrics = Annotated[Sequence[str], Word("NAME", option="--metric")]
 Point = Annotated[
     float | str,

@@ -56,11 +56,6 @@ class Link:
         """Paths of all numbers that decide the default."""
         return self.direct
 
-    @property
-    def is_same(self) -> bool:
-        """True if the number equals its single source."""
-        return self.function is None and len(self.direct) == 1 and not self.gap and self.factor == 1.0
-
     def number(self, present: Callable[[str], Any], computed: dict[Any, Any] | None = None) -> Any:
         """Return the default, with sources read by ``present``; ``computed`` keeps what several links have in common.
 

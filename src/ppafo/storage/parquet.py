@@ -1,9 +1,7 @@
 """Tables as Parquet files: unit and description of each column, reproducible bytes, detection of damage."""
 
-import contextlib
 import io
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +11,6 @@ from ppafo.wording import one_line
 
 if TYPE_CHECKING:
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
 _COMPRESSION_LEVEL = 1
 """Compression level of zstd, its fastest."""
@@ -25,51 +22,48 @@ _LONGEST_SHOWN = 120
 """Largest number of characters quoted from an error message of a library."""
 
 
-@dataclass(frozen=True, slots=True)
-class TableColumn:
-    """Column of a table: values as NumPy or Arrow array, one per row, with unit and description."""
-
-    values: Any
-    unit: str
-    summary: str
+Column = tuple[Any, str, str]
+"""Column of a table: an array of a value per row, or a matrix of a list per row; unit; description."""
 
 
-def table_of(columns: Mapping[str, TableColumn], described: Mapping[str, str]) -> "pa.Table":
-    """Return a table with units and descriptions of its columns; ``described`` is metadata of the table."""
-    import pyarrow as pa
+def parquet_bytes(columns: Mapping[str, Column], described: Mapping[str, str]) -> bytes:
+    """Return the Parquet file of columns as bytes, with ``described`` as metadata of the table.
 
-    arrays = [
-        pa.array(column.values) if isinstance(column.values, np.ndarray) else column.values
-        for column in columns.values()
-    ]
-    fields = [
-        pa.field(name, array.type, metadata={"unit": column.unit, "summary": column.summary})
-        for (name, column), array in zip(columns.items(), arrays, strict=True)
-    ]
-    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=dict(described)))
-
-
-def parquet_bytes(table: "pa.Table") -> bytes:
-    """Return the Parquet file of a table as bytes; equal tables give equal bytes with the same release of pyarrow.
-
-    Floats are byte-split and compressed, which saves a tenth to a third; pages have checksums.
+    Equal tables give equal bytes with the same release of pyarrow. Floats are byte-split and compressed, which saves a
+    tenth to a third; pages have checksums.
     """
+    import pyarrow as pa
     import pyarrow.parquet as pq
 
+    arrays = [_array(values) for values, _, _ in columns.values()]
+    fields = [
+        pa.field(name, array.type, metadata={"unit": unit, "summary": summary})
+        for (name, (_, unit, summary)), array in zip(columns.items(), arrays, strict=True)
+    ]
+    table, buffer = pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=dict(described))), io.BytesIO()
     # Bytes of one significance are alike from row to row, and texts are few that repeat.
-    floats = [field.name for field in table.schema if str(field.type) in _FLOATING_TYPES]
-    texts = [field.name for field in table.schema if str(field.type).startswith("dictionary")]
-    buffer = io.BytesIO()
     pq.write_table(
         table,
         buffer,
         compression="zstd",
         compression_level=_COMPRESSION_LEVEL,
-        use_dictionary=texts,
-        use_byte_stream_split=floats,
+        use_dictionary=[field.name for field in table.schema if str(field.type).startswith("dictionary")],
+        use_byte_stream_split=[field.name for field in table.schema if str(field.type) in _FLOATING_TYPES],
         write_page_checksum=True,
     )
     return buffer.getvalue()
+
+
+def _array(values: Any) -> "pa.Array":
+    """Return a column as Arrow has it: a list for each row of a matrix, and an empty cell for a text that is None."""
+    import pyarrow as pa
+
+    if not isinstance(values, np.ndarray):
+        return values
+    if values.ndim == 2:
+        offsets = np.arange(values.shape[0] + 1, dtype=np.int32) * values.shape[1]
+        return pa.ListArray.from_arrays(pa.array(offsets), pa.array(np.ascontiguousarray(values).reshape(-1)))
+    return pa.array(values, type=pa.string() if values.dtype == object else None)
 
 
 def read_parquet(file: io.BufferedIOBase, name: str, columns: Sequence[str] | None = None) -> "pa.Table":
@@ -77,36 +71,20 @@ def read_parquet(file: io.BufferedIOBase, name: str, columns: Sequence[str] | No
 
     Raises DataError for a damaged file (checksums included), for far too many values, and for a missing column.
     """
-    with _opened(file, name) as parquet:
-        # Counted before memory is taken: a column of one constant takes no room in the file.
-        groups = (parquet.metadata.row_group(number) for number in range(parquet.metadata.num_row_groups))
-        value_count = sum(group.column(column).num_values for group in groups for column in range(group.num_columns))
-        if value_count > _MAXIMUM_VALUES:
-            raise DataError(f"{name}: has {value_count:,} values; a table of a study has at most {_MAXIMUM_VALUES:,}")
-        missing = [column for column in columns or () if column not in parquet.schema_arrow.names]
-        if missing:
-            raise DataError(f"{name}: has no column '{one_line(missing[0])}'")
-        return parquet.read(columns=None if columns is None else list(columns))
-
-
-def column_names(file: io.BufferedIOBase, name: str) -> list[str]:
-    """Read the column names of a file and close the file; ``name`` is the file name in messages.
-
-    Raises DataError for a damaged file.
-    """
-    with _opened(file, name) as parquet:
-        return list(parquet.schema_arrow.names)
-
-
-@contextlib.contextmanager
-def _opened(file: io.BufferedIOBase, name: str) -> "Iterator[pq.ParquetFile]":
-    """Open a Parquet file for a ``with`` block, verifying checksums; damage found within is raised as DataError."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
         with file, pq.ParquetFile(file, page_checksum_verification=True) as parquet:
-            yield parquet
+            # Counted before memory is taken: a column of one constant takes no room in the file.
+            groups = (parquet.metadata.row_group(number) for number in range(parquet.metadata.num_row_groups))
+            count = sum(group.column(column).num_values for group in groups for column in range(group.num_columns))
+            if count > _MAXIMUM_VALUES:
+                raise DataError(f"{name}: has {count:,} values; a table of a study has at most {_MAXIMUM_VALUES:,}")
+            missing = [column for column in columns or () if column not in parquet.schema_arrow.names]
+            if missing:
+                raise DataError(f"{name}: has no column '{one_line(missing[0])}'")
+            return parquet.read(columns=None if columns is None else list(columns))
     except (pa.ArrowException, OSError, ValueError) as error:
         raise DataError(f"{name}: is not a complete Parquet file: {one_line(error)[:_LONGEST_SHOWN]}") from error
 
@@ -127,18 +105,3 @@ def encode_texts(codes: "np.ndarray[Any, Any]", texts: Sequence[str]) -> "pa.Dic
     import pyarrow as pa
 
     return pa.DictionaryArray.from_arrays(pa.array(codes, type=pa.int8()), pa.array(list(texts), type=pa.string()))
-
-
-def as_texts(texts: "Sequence[str | None] | np.ndarray[Any, Any]") -> "pa.Array":
-    """Return a text column, with empty cells for None."""
-    import pyarrow as pa
-
-    return pa.array(texts, type=pa.string())
-
-
-def lists_of(values: "np.ndarray[Any, Any]") -> "pa.ListArray":
-    """Return a list column, with a list for each row of a matrix (rows, values)."""
-    import pyarrow as pa
-
-    offsets = np.arange(values.shape[0] + 1, dtype=np.int32) * values.shape[1]
-    return pa.ListArray.from_arrays(pa.array(offsets), pa.array(np.ascontiguousarray(values).reshape(-1)))

@@ -36,15 +36,7 @@ from ppafo.simulation.ensemble.planning import absolute
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import scenario_document
 from ppafo.storage.files import LEFT_ASIDE, is_address, write_file
-from ppafo.storage.parquet import (
-    TableColumn,
-    as_texts,
-    encode_texts,
-    lists_of,
-    parquet_bytes,
-    read_parquet,
-    table_of,
-)
+from ppafo.storage.parquet import encode_texts, parquet_bytes, read_parquet
 from ppafo.storage.result_folder import MANIFEST
 from ppafo.studies.distributions import Floats
 from ppafo.studies.study import Configuration, Study
@@ -390,7 +382,7 @@ def compute_chunk(
     columns |= {
         "status": (encode_texts(rows["status"], STATUSES), _PLAIN, "how the run ended"),
         "failure_time": (rows["failure_time"], "s", "time at which the run diverged"),
-        "reason": (as_texts(rows["reason"]), _PLAIN, "why the run has no metrics"),
+        "reason": (rows["reason"], _PLAIN, "why the run has no metrics"),
         OSCILLATES: (rows["oscillates"], _PLAIN, "1 where the loop oscillates, empty where that is not known"),
         FOLLOWS: (rows["follows"], _PLAIN, f"1 where the run follows its reference, 0 {not_known}"),
         ON_PURPOSE: (rows["excused"].astype(float), _PLAIN, on_purpose),
@@ -406,10 +398,9 @@ def compute_chunk(
         # Channels with bands are kept as they were computed, all others in single precision.
         trace = trace.astype(np.float64 if channel in outputs.bands else np.float32)
         summary = f"{CHANNELS[channel].summary}, every {outputs.every:g} s"
-        columns[trace_column(channel)] = (lists_of(trace), stored_unit(CHANNELS[channel].unit), summary)
+        columns[trace_column(channel)] = (trace, stored_unit(CHANNELS[channel].unit), summary)
     facts = {"study": study.name, "chunk": str(part.number), "rows": str(part.runs), "every": f"{outputs.every!r} s"}
-    table = table_of({name: TableColumn(*column) for name, column in columns.items()}, facts)
-    return int(np.count_nonzero(rows[FAILED])), parquet_bytes(table)
+    return int(np.count_nonzero(rows[FAILED])), parquet_bytes(columns, facts)
 
 
 def _rows(

@@ -6,29 +6,20 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError
-from ppafo.storage.parquet import (
-    TableColumn,
-    as_numpy,
-    as_texts,
-    encode_texts,
-    lists_of,
-    parquet_bytes,
-    read_parquet,
-    table_of,
-)
+from ppafo.storage.parquet import as_numpy, encode_texts, parquet_bytes, read_parquet
 
 
 def content() -> bytes:
     """A file with a column of every sort."""
     random = np.random.default_rng(1)
     columns = {
-        "run": TableColumn(np.arange(500), "-", "number"),
-        "torque": TableColumn(random.normal(size=500), "N m", "a torque"),
-        "status": TableColumn(encode_texts(np.arange(500) % 2, ("good", "bad")), "-", "how it ended"),
-        "reason": TableColumn(as_texts([*[None] * 3, "why", *[None] * 496]), "-", "why"),
-        "trace": TableColumn(lists_of(random.normal(size=(500, 4)).astype(np.float32)), "N m", "over time"),
+        "run": (np.arange(500), "-", "number"),
+        "torque": (random.normal(size=500), "N m", "a torque"),
+        "status": (encode_texts(np.arange(500) % 2, ("good", "bad")), "-", "how it ended"),
+        "reason": (np.array([*[None] * 3, "why", *[None] * 496], dtype=object), "-", "why"),
+        "trace": (random.normal(size=(500, 4)).astype(np.float32), "N m", "over time"),
     }
-    return parquet_bytes(table_of(columns, {"study": "mine"}))
+    return parquet_bytes(columns, {"study": "mine"})
 
 
 def test_the_same_table_gives_the_same_bytes() -> None:
