@@ -7,7 +7,7 @@ parameters belong to the controller, so that they can differ from the device as 
 import math
 from typing import Annotated, NamedTuple
 
-from ppafo.control.controllers.pid import PidGains, PidState, pid_command, pid_restart
+from ppafo.control.controllers.pid import PidGains, PidState, pid_command
 from ppafo.control.kind import BelievedBand, ControllerKind
 from ppafo.control.torque_loop import beyond_dead_band, convergence_rate
 from ppafo.model.declaration import Number, Quantity, quantities_of
@@ -154,11 +154,6 @@ def feedforward_update(
     return command, _PidFeedforwardState(feedback, reference)
 
 
-def feedforward_restart(state: _PidFeedforwardState, requested: float, continues: float) -> _PidFeedforwardState:
-    """Return the state, reset where a new task starts (``continues`` 0): initial PID state and reference rate 0."""
-    return state._replace(feedback=pid_restart(state.feedback, requested, continues))
-
-
 PID_FEEDFORWARD = ControllerKind(
     name="pid_feedforward",
     summary="PID on the torque error, with feed-forward from a valve model along the reference.",
@@ -171,7 +166,6 @@ PID_FEEDFORWARD = ControllerKind(
     parameters=_PidFeedforwardParameters,
     initial=_PidFeedforwardState(),
     update=feedforward_update,
-    restart=feedforward_restart,
 )
 
 

@@ -87,13 +87,6 @@ def pid_update(
     return beyond_dead_band(opening, parameters.dead_band), after
 
 
-def pid_restart(state: PidState, requested: float, continues: float) -> PidState:
-    """State, reset after a change of task (``continues`` 0, else 1); ``requested`` [N m] is not used."""
-    return state._replace(
-        integral=state.integral * continues, slope=state.slope * continues, started=state.started * continues
-    )
-
-
 PID = ControllerKind(
     name="pid",
     summary="Proportional, integral and derivative action on the torque error.",
@@ -102,6 +95,5 @@ PID = ControllerKind(
     parameters=_PidParameters,
     initial=PidState(),
     update=pid_update,
-    restart=pid_restart,
     controls=ANYTHING,
 )

@@ -114,11 +114,6 @@ def dead_zone_update(
     return direction * parameters.opening, OnOffDeadZoneState(direction)
 
 
-def dead_zone_restart(state: OnOffDeadZoneState, requested: float, continues: float) -> OnOffDeadZoneState:
-    """State, reset after a change of task (``continues`` 0, else 1); ``requested`` [N m] is not used."""
-    return OnOffDeadZoneState(direction=state.direction * continues)
-
-
 ON_OFF_DEAD_ZONE = ControllerKind(
     name="on_off_dead_zone",
     summary="On/off with a dead zone and hysteresis: the valve opens for a large error and closes for a small one.",
@@ -127,7 +122,6 @@ ON_OFF_DEAD_ZONE = ControllerKind(
     parameters=OnOffDeadZoneParameters,
     initial=OnOffDeadZoneState(0.0),
     update=dead_zone_update,
-    restart=dead_zone_restart,
     controls=ANYTHING,
     only_switches=True,
 )
@@ -178,11 +172,6 @@ def sliding_update(
     return command, SlidingModeState(integral if is_inside else state.integral)
 
 
-def sliding_restart(state: SlidingModeState, requested: float, continues: float) -> SlidingModeState:
-    """State, reset after a change of task (``continues`` 0, else 1); ``requested`` [N m] is not used."""
-    return SlidingModeState(integral=state.integral * continues)
-
-
 SLIDING_MODE = ControllerKind(
     name="sliding_mode",
     summary="Sliding mode on the torque error and its integral, with a boundary layer.",
@@ -191,6 +180,5 @@ SLIDING_MODE = ControllerKind(
     parameters=SlidingModeParameters,
     initial=SlidingModeState(0.0),
     update=sliding_update,
-    restart=sliding_restart,
     controls=ANYTHING,
 )

@@ -178,11 +178,6 @@ def proportional_update(
     return command, _ProportionalState(integral)
 
 
-def proportional_restart(state: _ProportionalState, requested: float, continues: float) -> _ProportionalState:
-    """State, reset after a change of task (``continues`` 0, else 1); ``requested`` [N m] is not used."""
-    return _ProportionalState(integral=state.integral * continues)
-
-
 PROPORTIONAL = ControllerKind(
     name="proportional",
     summary="Proportional and integral action on the torque error.",
@@ -191,7 +186,6 @@ PROPORTIONAL = ControllerKind(
     parameters=_ProportionalParameters,
     initial=_ProportionalState(0.0),
     update=proportional_update,
-    restart=proportional_restart,
 )
 
 
