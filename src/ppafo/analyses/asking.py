@@ -18,9 +18,9 @@ from ppafo.simulation.gains import gains_of, remark_on_following_gains
 from ppafo.simulation.numbers import NOISE_SEED, changes_in
 from ppafo.simulation.simulate import Result, Status, simulate_many
 from ppafo.simulation.tracking import Tracking
-from ppafo.simulation.tracking.remarks import standing_still
 from ppafo.simulation.tracking.remedies import change_text
 from ppafo.simulation.tracking.rule import CRITERION_TEXTS, shortfall
+from ppafo.simulation.tracking.verdict import standing_still
 from ppafo.studies.distributions import Distribution, Floats
 from ppafo.studies.draws import (
     FEWEST_DRAWS,

@@ -14,12 +14,12 @@ from ppafo.model.declaration import PlainFunction, Quantity
 from ppafo.model.gas import critical_pressure_ratio
 from ppafo.parameters.device import VANE, Orifice, SonicOrifice
 from ppafo.parameters.graph import Link, follows
-from ppafo.simulation.mean_chambers import MeanChambers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.torque_loop import (
     GROUPS,
     LoopLink,
     LoopParts,
+    MeanChambers,
     conductance_of_area,
     conductance_of_sonic,
     product_of,

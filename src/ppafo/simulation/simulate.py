@@ -212,7 +212,7 @@ class Result(RecordedResult):
 
         ``verdict`` is ``tracking``, with or without remedies that were tried.
         """
-        from ppafo.simulation.tracking.remarks import remarks_on
+        from ppafo.simulation.tracking.verdict import remarks_on
 
         remarks = remarks_on(self, not verdict.fails and bool(verdict.said))
         said = (verdict.sentence, *remarks, changed_text(changes_in(self.scenario)))

@@ -21,8 +21,13 @@ from ppafo.simulation.ensemble.planning import absolute
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking import most_reversals
-from ppafo.simulation.tracking.rule import TrackingExcess, command_turning, needed_metrics, tracking_excess
-from ppafo.simulation.tracking.settled import smallest_change
+from ppafo.simulation.tracking.rule import (
+    TrackingExcess,
+    command_turning,
+    needed_metrics,
+    smallest_change,
+    tracking_excess,
+)
 from ppafo.studies.distributions import Floats
 from ppafo.studies.limits import check_metrics
 from ppafo.study.blocks import runs_at_once

@@ -15,7 +15,7 @@ from ppafo.analyses.find import ACCURACY, Threshold, find
 from ppafo.errors import StudyError
 from ppafo.progress import Progress
 from ppafo.report.finding import Finding
-from ppafo.simulation.tracking.settled import task_parts
+from ppafo.simulation.tracking.rule import task_parts
 from tests.model_runs import model_runs
 
 Floats = NDArray[np.float64]

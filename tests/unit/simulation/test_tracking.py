@@ -16,8 +16,7 @@ from ppafo.remedy_trials import verdict_of
 from ppafo.running import simulate
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.tracking import tracking_in
-from ppafo.simulation.tracking.rule import excess_of_part, failure_of_task, most_reversals
-from ppafo.simulation.tracking.settled import task_parts
+from ppafo.simulation.tracking.rule import excess_of_part, failure_of_task, most_reversals, task_parts
 from ppafo.study.runs import run_judged
 
 TASK = "torque-task-proportional"

@@ -13,8 +13,14 @@ from ppafo.loading import load_scenario
 from ppafo.metrics.metric import followed
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
-from ppafo.simulation.tracking.rule import excess_of_part, needed_metrics, part_limits
-from ppafo.simulation.tracking.settled import settled_parts, smallest_change, task_parts
+from ppafo.simulation.tracking.rule import (
+    excess_of_part,
+    needed_metrics,
+    part_limits,
+    settled_parts,
+    smallest_change,
+    task_parts,
+)
 from ppafo.study.runs import run_judged
 
 TASK = "torque-task-proportional"

@@ -12,7 +12,7 @@ import ppafo
 from ppafo.analyses.tune import tune
 from ppafo.analyses.tuning import Tuned, json_schema, list_tunings, load_tuning
 from ppafo.errors import StudyError
-from ppafo.simulation.tracking.settled import task_parts
+from ppafo.simulation.tracking.rule import task_parts
 
 DOCUMENT: dict[str, Any] = {
     "schema_version": 1,
