@@ -12,7 +12,7 @@ from typing import Any
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.kind import ControllerKind
-from ppafo.errors import ParameterError, PpafoError, ScenarioError, noted_in, raise_noted
+from ppafo.errors import ParameterError, PpafoError, ScenarioError, noted_in, raise_noted, refused_as
 from ppafo.model.catalog import VALVES
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
@@ -106,7 +106,7 @@ def read_hardware(reading: DocumentReader) -> Hardware:
     """
     section, in_file, overrides = reading.document["device"], reading.content.get("device", {}), reading.device
     valve = section.get("valve")
-    try:
+    with refused_as(ParameterError, f"{reading.file}: [device]", ParameterError):
         of_file = read_overrides(section.get("overrides", ()))
         check_valve(of_file, in_file.get("valve"), f"device.valve = '{in_file.get('valve')}'")
         plain_set = reading.parameter_set or load_parameter_set(set_name(section["set"], reading.folder))
@@ -127,8 +127,6 @@ def read_hardware(reading: DocumentReader) -> Hardware:
         set_of_file = with_overrides(plain_set, of_file, valve)
         if replaced:
             _warn_once(f"ppafo: {reading.file}: {replaced}")
-    except ParameterError as error:
-        raise device_error(reading, error) from error
     before = atmospheric_pressure(set_of_file) if overrides else None
     changed = with_overrides(set_of_file, overrides, valve)
     return Hardware(changed, valve_name, links_of_set(changed, overridden, before), replaced)
@@ -145,10 +143,8 @@ def set_name(name: str, folder: Path) -> str:
 
 def read_device(reading: DocumentReader, hardware: Hardware) -> Device:
     """Return the device of a parameter set with its overrides; ParameterError for missing or contradictory values."""
-    try:
+    with refused_as(ParameterError, f"{reading.file}: [device]", ParameterError):
         device = build_device(hardware.parameter_set, hardware.valve, hardware.links)
-    except ParameterError as error:
-        raise device_error(reading, error) from error
     written = chosen_units(_leaves([value_at(reading.document, part) for part in _PARTS_WITH_UNITS]))
     levels = [path for path in sorted(reading.overridden) if path.startswith(PATHS_THAT_SET_UNITS)]
     overridden = units_of_texts(value_at(reading.document, path) for path in levels)
@@ -159,11 +155,6 @@ def _leaves(value: Any) -> list[Any]:
     """Return the values of nested tables and lists in order."""
     inner = list(value.values()) if isinstance(value, Mapping) else value
     return [leaf for item in inner for leaf in _leaves(item)] if isinstance(inner, list) else [value]
-
-
-def device_error(reading: DocumentReader, error: ParameterError) -> ParameterError:
-    """Return a ParameterError that names the scenario in which ``error`` was raised, on one line."""
-    return ParameterError(f"{reading.file}: [device]: {one_line(error)}")
 
 
 def build_scenario(reading: DocumentReader) -> Scenario:
@@ -224,7 +215,7 @@ def build_scenario(reading: DocumentReader) -> Scenario:
         if problem:
             raise ScenarioError(f"{reading.file}: {problem}")
         check_contradictions(scenario, reading)
-        try:
+        with refused_as(ParameterError, f"{reading.file}: [device]", ParameterError):
             if supply_line is not None:
                 device.check_pressurised(f"a [{SUPPLY_LINE}] with its regulators")
             if law.needs_reference and law.controls == (TORQUE,):
@@ -234,8 +225,6 @@ def build_scenario(reading: DocumentReader) -> Scenario:
             check_regulated(device, law, controlled)
             if law.plan is not None:
                 device.check_torque_constant("a fixed-point controller")
-        except ParameterError as error:
-            raise device_error(reading, error) from error
         return scenario
 
 
