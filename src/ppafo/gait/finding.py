@@ -67,8 +67,8 @@ class GaitFound:
                         "strides": len(curve.strides),
                         "mean": curve.mean.tolist(),
                         "deviation": curve.deviation.tolist(),
-                        "fit_root_mean_square": imported.fit_errors[name].root_mean_square,
-                        "fit_largest": imported.fit_errors[name].largest,
+                        "fit_root_mean_square": curve.fitted[1].root_mean_square,
+                        "fit_largest": curve.fitted[1].largest,
                     }
                     for name, curve in imported.curves.items()
                 },
@@ -127,7 +127,7 @@ def _row(gait: Gait, name: str, imported: ImportedGait | None) -> tuple[str | No
     is_ankle = name == "ankle_angle"
     series = curve.values_at(PHASES)
     values = kind.values(clinical_angle(series) if is_ankle else series)
-    left = 0.0 if imported is None else kind.shown(imported.fit_errors[name].root_mean_square)
+    left = 0.0 if imported is None else kind.shown(imported.curves[name].fitted[1].root_mean_square)
     return (
         f"{name} (0 neutral, dorsiflexion positive)" if is_ankle else name,
         f"{values.min():.3g}",

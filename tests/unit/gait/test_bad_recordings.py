@@ -188,6 +188,14 @@ def test_a_force_that_is_not_half_the_weight_is_remarked(
     assert import_gait(str(csv_of(columns)), ImportSettings(62.0)).remarks == ()
 
 
+def test_a_gap_in_a_table_with_the_names_of_the_package_is_filled(
+    csv_of: Callable[..., Path], columns: dict[str, Floats]
+) -> None:
+    columns[ANKLE][500:508] = np.nan
+    lost, filled = (import_gait([csv_of(columns)], ImportSettings(62.0, longest_gap=gap)) for gap in (0.0, 0.1))
+    assert (lost.gait.strides, filled.gait.strides) == (4, 5)
+
+
 def test_a_time_in_milliseconds_is_refused(
     csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording
 ) -> None:

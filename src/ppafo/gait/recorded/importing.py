@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ppafo.arguments import checked
 from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.document import load_gait
-from ppafo.gait.gait import HARMONICS, REQUIRED, FitError, Gait, Origin, fit_curve
+from ppafo.gait.gait import HARMONICS, REQUIRED, FitError, Gait, GaitCurve, Origin, fit_curve
 from ppafo.gait.plausible import (
     MeanStride,
     check_plausible,
@@ -109,6 +109,11 @@ class CurveStatistics:
         share = float(np.mean([stride.stance_share for stride in self.strides]))
         return np.asarray((PHASES > _UNLOADED_PHASE) & (share - _UNLOADED_PHASE > PHASES))
 
+    @cached_property
+    def fitted(self) -> tuple[GaitCurve, FitError]:
+        """Fourier series of the mean, and its error."""
+        return fit_curve(self.mean, HARMONICS[self.name], self.spread)
+
     @property
     def spread(self) -> float:
         """RMS over the phases of the standard deviation between strides, in the unit of the curve [SI]."""
@@ -138,19 +143,17 @@ class StrideSelection:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImportedGait:
-    """Imported gait with the strides, curves and fit errors behind it.
+    """Imported gait with the strides and curves behind it.
 
     ``strides`` are the strides used and ``left_out`` the strides rejected. ``curves`` holds the single strides by curve
-    name, ``fit_errors`` the errors of the Fourier series. ``events`` is the source of the strides: ``vertical_force``,
-    ``shank_angle`` or ``events of the file``. ``files`` are the names of the files, ``remarks`` the sentences for the
-    user.
+    name. ``events`` is the source of the strides: ``vertical_force``, ``shank_angle`` or ``events of the file``.
+    ``files`` are the names of the files, ``remarks`` the sentences for the user.
     """
 
     gait: Gait
     strides: tuple[Stride, ...]
     left_out: tuple[Stride, ...]
     curves: Mapping[str, CurveStatistics]
-    fit_errors: Mapping[str, FitError]
     events: str
     files: tuple[str, ...]
     remarks: tuple[str, ...] = field(default=())
@@ -184,11 +187,9 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
         stride_time=float(np.mean([stride.time for stride in strides.taken])),
         is_knee_one_marker=len(labels) == 2 and labels[0] == labels[1] != "",
     )
-    fitted = {name: fit_curve(curve.mean, HARMONICS[name], curve.spread) for name, curve in curves.items()}
-    errors = {name: error for name, (_, error) in fitted.items()}
     walk = {name: footfalls.walk[name] for name in curves}
     most = f"at most {100.0 * REFUSED_SPREAD:.0f} % and {100.0 * REFUSED_MISFIT:.0f} % are accepted"
-    scattered = _scatters(curves, errors, REFUSED_SPREAD, REFUSED_MISFIT)
+    scattered = _scatters(curves, REFUSED_SPREAD, REFUSED_MISFIT)
     wrong += [DataError(f"{walk[name].file}: {message}; {most}") for name, message in scattered]
     with noted_in(wrong):
         # The ankle of the other foot looks like a wrong zero to the checks of the curves.
@@ -201,11 +202,24 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
             against = f"the knee moves backwards at {-speed:.2g} m/s, so knee.forward points against the"
             wrong.append(DataError(f"{way.file}: {against} walking direction"))
     raise_noted(wrong)
-    further = _remarks(source, footfalls.events, walk, curves, errors, strides)
+    less = ": heel strikes and toe-offs are from shank_angle and less exact" if footfalls.events == SHANK else ""
+    foot, count = source.columns.ankle_angle, len(strides.taken)
+    remarks = [
+        *(*source.remarks, *footfalls.remarks, *unmeasured),
+        *(f"stride from {each.start:.4g} to {each.end:.4g} s left out: {why}" for each, why in strides.left_out),
+        *(f"{name} covers {own} of {count} strides" for name in curves if (own := len(curves[name].strides)) < count),
+        *([] if FORCE in curves else [f"no vertical force{less}"]),
+        *knee_remarks(source.columns.knee, walk, source.settings.stature),
+        *([] if foot.terms else [f"ankle angle from the markers {foot.heel} and {foot.toe}; zero from the flat foot"]),
+        *stride_remarks(mean_stride.curves),
+        *(
+            f"{message}: the data are noisy, or the walk is not steady"
+            for _, message in _scatters(curves, REMARKED_SPREAD, REMARKED_MISFIT)
+        ),
+    ]
     settings, names = source.settings, ", ".join(Path(table.file).name for table in source.tables)
     # A file states that it was made by a model, never that it was measured.
     origin: Origin = "imported" if all(table.kind == "measured" for table in source.tables) else "synthetic"
-    count, series = len(strides.taken), {name: curve for name, (curve, _) in fitted.items()}
     times, shares = ([getattr(stride, name) for stride in strides.taken] for name in ("time", "stance_share"))
     # A table over percent does not state the number of its strides.
     is_mean_stride = any(table.is_mean_stride for table in source.tables)
@@ -223,17 +237,16 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
         stride_time_deviation=float(np.std(times, ddof=1)) if count > 1 else 0.0,
         stance_share_deviation=float(np.std(shares, ddof=1)) if count > 1 else 0.0,
         strides=count,
-        **dict[str, Any](series),
+        **dict[str, Any]({name: curve.fitted[0] for name, curve in curves.items()}),
     )
     return ImportedGait(
         gait=gait,
         strides=strides.taken,
         left_out=tuple(stride for stride, _ in strides.left_out),
         curves=curves,
-        fit_errors=errors,
         events=footfalls.events,
         files=tuple(table.file for table in source.tables),
-        remarks=tuple(dict.fromkeys([*source.remarks, *footfalls.remarks, *unmeasured, *further])),
+        remarks=tuple(dict.fromkeys(remarks)),
     )
 
 
@@ -423,42 +436,15 @@ def acceleration_of(position: Floats, harmonics: int, stride_time: float) -> Flo
     return curve.derivative(stride_time).derivative(stride_time).values_at(phase)
 
 
-def _remarks(
-    source: GaitSource,
-    events: str,
-    walk: Mapping[str, Signal],
-    curves: Mapping[str, CurveStatistics],
-    errors: Mapping[str, FitError],
-    strides: StrideSelection,
-) -> list[str]:
-    """Return the remarks on strides, signs and sizes of the curves, zero of the ankle, and scatter."""
-    means, count = {name: curve.mean for name, curve in curves.items()}, len(strides.taken)
-    less = ": heel strikes and toe-offs are from shank_angle and less exact" if events == SHANK else ""
-    foot = source.columns.ankle_angle
-    zero = f"ankle angle from the markers {foot.heel} and {foot.toe}; zero from the flat foot"
-    return [
-        *(f"stride from {each.start:.4g} to {each.end:.4g} s left out: {why}" for each, why in strides.left_out),
-        *(f"{name} covers {own} of {count} strides" for name in curves if (own := len(curves[name].strides)) < count),
-        *([] if FORCE in means else [f"no vertical force{less}"]),
-        *knee_remarks(source.columns.knee, walk, source.settings.stature),
-        *([zero] if foot.terms is None else []),
-        *stride_remarks(means),
-        *(
-            f"{message}: the data are noisy, or the walk is not steady"
-            for _, message in _scatters(curves, errors, REMARKED_SPREAD, REMARKED_MISFIT)
-        ),
-    ]
-
-
 def _scatters(
-    curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError], most_spread: float, most_misfit: float
+    curves: Mapping[str, CurveStatistics], most_spread: float, most_misfit: float
 ) -> Iterator[tuple[str, str]]:
     """Yield each curve whose spread or misfit, as a fraction of the range, exceeds its limit, with a description."""
     for name, curve in curves.items():
         moved = float(np.ptp(curve.mean))
         if moved <= 0.0:
             continue
-        spread, misfit = curve.spread / moved, errors[name].root_mean_square / moved
+        spread, misfit = curve.spread / moved, curve.fitted[1].root_mean_square / moved
         if spread > most_spread or misfit > most_misfit:
             yield (
                 name,

@@ -190,15 +190,12 @@ def unsigned_names(mapped: object) -> list[str]:
 
 def unsaid_axes(columns: GaitMap) -> list[str]:
     """Return remarks on assumed axes, for markers whose map does not state the forward or the upward axis."""
-    axes = []
-    for name, mapped in (("shank_angle", columns.shank_angle), ("ankle_angle", columns.ankle_angle)):
-        axes_of = dict(zip(("forward", "vertical"), mapped.axes, strict=True))
-        unsaid = [key for key in axes_of if getattr(mapped, key) is None]
-        if mapped.terms is None and unsaid:
-            assumed_axes = " and ".join(f'{key} = "{axes_of[key]}"' for key in unsaid)
-            verb = "is" if len(unsaid) == 1 else "are"
-            axes.append(f"the gait map does not give {' and '.join(unsaid)} of {name}: {assumed_axes} {verb} assumed")
-    return axes
+    return [
+        f"{name}.{key} is {axis!r}, assumed: the gait map does not give it"
+        for name, mapped in (("shank_angle", columns.shank_angle), ("ankle_angle", columns.ankle_angle))
+        for key, axis in zip(("forward", "vertical"), mapped.axes, strict=True)
+        if mapped.terms is None and getattr(mapped, key) is None
+    ]
 
 
 Side = Literal["right", "left"]
