@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,10 +12,8 @@ from numpy.typing import NDArray
 from ppafo.control.walking.assistance import PEAKS
 from ppafo.engine.lanes import Floats
 from ppafo.metrics import Metric
-from ppafo.parameters.graph import Asked
 from ppafo.signals import Recording
-from ppafo.simulation.default_gains import loop_parts
-from ppafo.simulation.numbers import changes_in, number_at
+from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import RecordedResult, Status, in_own_units
 from ppafo.simulation.tracking import Tracking, tracking_in
@@ -26,7 +23,7 @@ from ppafo.storage.opensim import opensim_recording, write_opensim
 from ppafo.walking.bottle.coupling import SupplyCourse
 from ppafo.walking.motion import walk_of
 from ppafo.walking.strides import Curves
-from ppafo.wording import changed_text, override_text
+from ppafo.wording import changed_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -108,15 +105,8 @@ class WalkResult(RecordedResult):
 
 def limited_request(scenario: Scenario) -> str:
     """Remark on peaks of the desired torque that ``largest_torque`` of the controller cuts; "" without any."""
-    settings, path, law = scenario.controller.settings, "controller.largest_torque", scenario.law
+    settings = scenario.controller.settings
     limit = settings.get("largest_torque", math.inf)
-    peaks = {name: settings[name] for name in PEAKS if settings.get(name, 0.0) > limit}
-    if not peaks or law is None:
-        return ""
-    reach = loop_parts(scenario, law).group("reach", Asked(partial(number_at, scenario)), {})
-    larger, present = (level_text("N m", torque) for torque in (min(max(peaks.values()), reach), limit))
-    advice = f"the actuator gives at most {level_text('N m', reach)} at this supply pressure"
-    if reach > limit and larger != present:
-        advice = f"not tried: {override_text([f'{path}={larger}'])}"
-    cut = ", ".join(f"controller.{name} = {level_text('N m', peak)}" for name, peak in peaks.items())
-    return f"{cut}: the request is limited by {path} = {present}; {advice}"
+    peaks = [(f"controller.{name}", settings[name]) for name in PEAKS if settings.get(name, 0.0) > limit]
+    cut = ", ".join(f"{path} = {level_text('N m', peak)}" for path, peak in peaks)
+    return f"{cut}: the request is limited by controller.largest_torque = {level_text('N m', limit)}" if cut else ""

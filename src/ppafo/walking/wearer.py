@@ -220,26 +220,18 @@ def wearer_origin(reading: DocumentReader, gait: Gait, is_named: bool) -> str:
 
 def who_walks(wearer: Wearer, gait: Gait, origin: str) -> str:
     """Return a line on the wearer, and on the gait's own subject if that is another person."""
-    line = f"wearer: {wearer.body_mass:.4g} kg, {origin}"
     is_subject = origin.startswith("the subject of")
-    default_stature = (gait.stature if is_subject else None) or _PAPER.stature
-    if abs(wearer.stature - default_stature) > _SAME * wearer.stature:
-        low, high = STATURES
-        line += f"; {wearer.stature:.4g} m tall, segments scaled by mass and stature"
-        if not low <= wearer.stature <= high:
-            line += f" in the proportions of adults of {low:g} to {high:g} m, extrapolated here"
-        line += "; the curves of the gait are not scaled by stature"
+    said, default_stature = f"wearer: {wearer.body_mass:.4g} kg, {origin}", (gait.stature if is_subject else None)
+    if abs(wearer.stature - (default_stature or _PAPER.stature)) > _SAME * wearer.stature:
+        (low, high), tall = STATURES, wearer.stature
+        beyond = "" if low <= tall <= high else f" in the proportions of adults of {low:g} to {high:g} m, extrapolated"
+        said += f"; {tall:.4g} m tall, segments scaled by mass and stature{beyond}; curves of the gait are not scaled"
     elif wearer.shank_mass == _PAPER.shank_mass and abs(wearer.body_mass / _PAPER.body_mass - 1.0) > _SAME:
-        line += f", with the leg of the paper's subject, {_PAPER.body_mass:g} kg; wearer.stature scales the leg"
-    if is_subject:
-        return line if gait.stature is None or wearer.stature != gait.stature else f"{line}, {gait.stature:.4g} m"
-    if abs(wearer.body_mass - gait.body_mass) <= _SAME * gait.body_mass:
-        return line
-    line += (
-        f"; the subject of gait '{gait.name}' has {gait.body_mass:.4g} kg: moment and force of the gait are "
-        "scaled by body mass"
-    )
-    low, high = (fraction * gait.body_mass for fraction in SCALED_MASS)
-    if not low <= wearer.body_mass <= high:
-        line += f", extrapolated outside {low:.0f} to {high:.0f} kg"
-    return line
+        said += f", with the leg of the paper's subject, {_PAPER.body_mass:g} kg; wearer.stature scales the leg"
+    if wearer.stature == default_stature:
+        said += f", {wearer.stature:.4g} m"
+    if not is_subject and abs(wearer.body_mass - gait.body_mass) > _SAME * gait.body_mass:
+        low, high = (fraction * gait.body_mass for fraction in SCALED_MASS)
+        beyond = "" if low <= wearer.body_mass <= high else f", extrapolated outside {low:.0f} to {high:.0f} kg"
+        said += f"; moment and force of gait '{gait.name}' ({gait.body_mass:.4g} kg) are scaled by body mass{beyond}"
+    return said

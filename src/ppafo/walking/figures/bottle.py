@@ -1,7 +1,6 @@
 """Figure of a walk on a gas bottle over time: pressures, temperatures, peak torques and remaining gas."""
 
 from collections.abc import Sequence
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -61,46 +60,36 @@ def bottle_figure(result: WalkResult) -> "Figure":
         behind.append(Mark("band", strikes, span, label="line, in a stride", style={"alpha": 0.3}))
     regulator = supply.supply.bottle.regulator
     needed = regulator.set_pressure + regulator.pressure_margin
-    panel = partial(
-        _panel, end, Mark("at", supply.ending.time, label="end", colour=VERMILION, style={"linewidth": 1.0})
-    )
+    ended = Mark("at", supply.ending.time, label="end", colour=VERMILION, style={"linewidth": 1.0})
+    axis = duration_kind(end)
+
+    def panel(kind: Kind, marks: Sequence[Mark], largest: float | None = None) -> Panel:
+        """Panel up to the end of the walk; with ``largest`` [SI], its axis starts at 0 and includes this value."""
+
+        def set_limits(axes: "Axes") -> None:
+            axes.set_xlim(0.0, 1.005 * float(axis.values(end)))
+            axes.locator_params(axis="y", nbins=5)
+            if largest is not None:
+                axes.set_ylim(0.0, 1.08 * kind.shown(largest))
+
+        return Panel(axis, kind, [*marks, ended], then=set_limits, shares_x=True)
+
+    needs = Mark("level", y=needed, label="needed", colour=VERMILION, style=_DASHED)
+    held = values["bottle_pressure"]
     return draw_panels(
         [
             panel(Kind("Pressure behind the regulator", "Pa_a", "pressure"), behind),
             panel(
                 Kind("Pressure in the bottle", "Pa_a", "pressure"),
-                [
-                    Mark("level", y=needed, label="needed", colour=VERMILION, style=_DASHED),
-                    Mark("line", times, values["bottle_pressure"], label="bottle"),
-                ],
-                largest=float(np.max(values["bottle_pressure"])),
+                [needs, Mark("line", times, held, label="bottle")],
+                float(np.max(held)),
             ),
             panel(Kind("Temperature, mean of a stride", "K", "temperature"), temperatures),
-            panel(
-                Kind("Peak torque of each stride", "N m", "torque"),
-                torque,
-                largest=float(peaks.max(initial=_LEAST_TORQUE)),
-            ),
-            panel(Kind("Left in the bottle", "kg", "gas mass"), left, largest=supply.supply.mass),
+            panel(Kind("Peak torque of each stride", "N m", "torque"), torque, float(peaks.max(initial=_LEAST_TORQUE))),
+            panel(Kind("Left in the bottle", "kg", "gas mass"), left, supply.supply.mass),
         ],
         size=(5.4, 1.6),
         title=f"{result.scenario.name} on {supply.supply.bottle.label}",
         note=f"End: {supply.ending.message}.",
         kind=recording.kind,
     )
-
-
-def _panel(end: float, ended: Mark, kind: Kind, marks: Sequence[Mark], largest: float | None = None) -> Panel:
-    """Return a panel over time up to ``end`` [s], with a line at the time when the bottle ended the walk, if any.
-
-    With ``largest`` [SI], the value axis starts at 0 and includes this value.
-    """
-    axis = duration_kind(end)
-
-    def set_limits(axes: "Axes") -> None:
-        axes.set_xlim(0.0, 1.005 * float(axis.values(end)))
-        axes.locator_params(axis="y", nbins=5)
-        if largest is not None:
-            axes.set_ylim(0.0, 1.08 * kind.shown(largest))
-
-    return Panel(axis, kind, [*marks, ended], then=set_limits, shares_x=True)
