@@ -205,9 +205,9 @@ def identify(
         reader = RecordingReader(asked.columns, path.parent, file, before)
         tasks, used = read_tasks(asked.procedure, reader)
         results: list[BenchResult] = []
-        for task in tasks:
-            context = BenchContext(current, device.valve, task.label, tolerances)
-            results.append(run_procedure(task.sources, task.procedure, context))
+        for procedure, sources, label in tasks:
+            context = BenchContext(current, device.valve, label, tolerances)
+            results.append(run_procedure(sources, procedure, context, results))
             # Each procedure finds the estimates of earlier ones in the set.
             current = with_estimates(current, results[-1].estimates).parameter_set
         estimates = [estimate for result in results for estimate in result.estimates]

@@ -9,7 +9,7 @@ import numpy as np
 
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel
-from ppafo.report.style import BLACK, BLUE, GREY, VERMILION
+from ppafo.report.style import BLACK, BLUE, CHAMBER_1, CHAMBER_2, GREY, VERMILION
 from ppafo.signals.recording import Floats
 
 if TYPE_CHECKING:
@@ -37,6 +37,8 @@ _LOOKS = {
     "falling": _ReadingStyle(VERMILION, 1200, {"marker": "o", "markerfacecolor": "none", **_READING}),
     "measured": _ReadingStyle(BLUE, 1200, {"marker": ".", "linestyle": "none", "markersize": 4}),
     "circles": _ReadingStyle(BLACK, 90, {"marker": "o", "markersize": 3.6, "markeredgewidth": 0.7, **_HOLLOW}),
+    "pressure_1": _ReadingStyle(CHAMBER_1.colour, 1200, {"marker": "^", "linestyle": "none", "markersize": 3}),
+    "pressure_2": _ReadingStyle(CHAMBER_2.colour, 1200, {"marker": "v", "linestyle": "none", "markersize": 3}),
     "dots": _ReadingStyle(BLACK, 400, {"marker": ".", "markersize": 2.6, "linestyle": ""}),
 }
 """Styles of measured points by name."""
@@ -56,13 +58,18 @@ def curve_mark(label: str, x: Floats, y: Floats) -> Mark:
 
 
 def with_residuals(
-    title: str, x: Kind, y: Kind, marks: Sequence[Mark], at: Floats, residuals: Floats
+    title: str, x: Kind, y: Kind, series: Sequence[tuple[str, str, Floats, Floats, Floats]], curves: Sequence[Mark]
 ) -> tuple[Panel, Panel]:
-    """Return a panel with the given marks, and a panel of the residuals [SI] at horizontal positions ``at``."""
+    """Return a panel of readings with curves of the model, and a panel of the residuals.
+
+    ``series`` are label, name of the style, horizontal positions, readings and model [SI]; the last lies uppermost.
+    """
     quantity = "pressure change" if y.quantity == "pressure" else y.quantity
-    left = [readings_mark("", at, residuals), Mark("level", (), 0.0, colour=BLACK, style={"linewidth": 1.4})]
-    below = Panel(x, Kind("Residual (measured - model)", y.unit, quantity), left, "Residuals", legend="")
-    return Panel(x, y, marks, title, legend="figure"), below
+    upper = [readings_mark(label, at, readings, look) for label, look, at, readings, _ in series]
+    lower = [readings_mark("", at, readings - model, look) for _, look, at, readings, model in series]
+    lower.append(Mark("level", (), 0.0, colour=BLACK, style={"linewidth": 1.4}))
+    below = Panel(x, Kind("Residual (measured - model)", y.unit, quantity), lower, "Residuals", legend="")
+    return Panel(x, y, [*upper, *curves], title, legend="figure"), below
 
 
 @dataclass(frozen=True, slots=True)

@@ -369,38 +369,33 @@ def _read(
     return Recording(experiment, times, described, kind="synthetic"), errors
 
 
-def check_rig_folder(folder: Path, experiment: str) -> None:
-    """Raise DataError if a folder is not writable or contains files of another origin; called before a run."""
-    _earlier(folder, f"{experiment}.csv")
-    check_files_can_be_added(folder, [f"{experiment}.csv", RIG_FILE])
-
-
 def write_rig_recording(folder: Path, recorded: RigRecording) -> tuple[str, ...]:
     """Write recording and true parameters into a folder, and return the file names.
 
     Raises DataError if the folder contains files of another origin.
     """
-    name = f"{recorded.truth['experiment']}.csv"
-    recordings = {**_earlier(folder, name), name: dict(recorded.truth)}
+    experiment = recorded.truth["experiment"]
+    recordings = {**check_rig_folder(folder, experiment), f"{experiment}.csv": dict(recorded.truth)}
     document = {
         "format": _RIG_FORMAT,
         "schema_version": 1,
         "notice": NOTICE,
         "recordings": {key: recordings[key] for key in sorted(recordings)},
     }
+    written = {RIG_FILE: f"{json_text(document)}\n".encode(), f"{experiment}.csv": marked_csv_bytes(recorded.recording)}
     # By rig.json a folder is known to be the rig's: it is there first, whenever the process is killed.
-    add_files(folder, {RIG_FILE: f"{json_text(document)}\n".encode(), name: marked_csv_bytes(recorded.recording)})
-    return name, RIG_FILE
+    add_files(folder, written)
+    return f"{experiment}.csv", RIG_FILE
 
 
-def _earlier(folder: Path, name: str) -> dict[str, Any]:
+def check_rig_folder(folder: Path, experiment: str) -> dict[str, Any]:
     """Return the entries of ``rig.json`` for the recordings already in a folder.
 
-    Raises DataError if the folder was not written by the rig, or if the recording ``name`` would replace a file of
-    another origin.
+    Raises DataError if the folder is not writable or was not written by the rig, or if the recording would replace a
+    file of another origin.
     """
     # A file that a killed writer left behind is the writer's own.
-    entries = entries_of(folder) if folder.is_dir() else []
+    entries, name = entries_of(folder) if folder.is_dir() else [], f"{experiment}.csv"
     present = {entry.name for entry in entries if LEFT_ASIDE not in entry.name}
     recordings: Any = {}
     if RIG_FILE in present:
@@ -416,4 +411,5 @@ def _earlier(folder: Path, name: str) -> dict[str, Any]:
             f"{folder}: contains '{name}', which was not written by the simulated test bench; move this file or choose "
             "another folder"
         )
+    check_files_can_be_added(folder, [name, RIG_FILE])
     return dict(recordings)

@@ -10,7 +10,7 @@ from ppafo.identification.bench.flow import GasAt, Opening, orifice_shape
 from ppafo.identification.bench.law import BenchContext, BenchResult
 from ppafo.identification.bench.valve_map import area_of_command, spool_of
 from ppafo.identification.bench.vane_leak import pressures_of_fall
-from ppafo.identification.procedures import LAWS
+from ppafo.identification.procedures import LAWS, check_channels
 from ppafo.identification.source import RecordingSource
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.parameters.loading import load_parameter_set
@@ -148,7 +148,10 @@ def of_law(kind: str, sources: Sources, tolerances: Tolerances, numbers: Numbers
     )
     given = {name: value for name, value in keys.items() if value is not None}
     sources = tuple(replace(source, user=kind) for source in sources)
-    return record_from(LAWS[kind], {"kind": kind, "recordings": ["a.csv"], **given}).run(sources, context)
+    law: Any = record_from(LAWS[kind], {"kind": kind, "recordings": ["a.csv"], **given})
+    for source in sources:
+        check_channels(source.name, law, source.recording.names)
+    return law.run(sources, context)
 
 
 def in_gas(kind: str, sources: Sources, gas: GasAt, tolerances: Tolerances, more: Numbers, **keys: Any) -> BenchResult:

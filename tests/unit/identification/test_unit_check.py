@@ -172,10 +172,10 @@ def test_a_table_of_flow_gives_the_conductance_of_its_formula(tmp_path: Path, at
     assert ratio.value == pytest.approx(0.3, abs=0.03)
 
 
-def test_a_pressure_in_a_unit_that_scatters_is_remarked_on(tmp_path: Path) -> None:
+def test_a_pressure_in_a_unit_that_scatters_is_wrong_where_the_other_unit_gives_the_set(tmp_path: Path) -> None:
     (result,) = flow_table(tmp_path, "kPa_g", ', gas = "air"').results
-    assert all(estimate.verdict != "unit probably wrong" for estimate in result.estimates)
-    assert any("psi read as kPa, a factor of 6.895" in remark for remark in result.remarks)
+    assert {estimate.verdict for estimate in result.estimates} == {"unit probably wrong"}
+    assert "psi read as kPa, a factor of 6.895" in result.estimates[0].explanation
 
 
 def test_a_flow_metered_as_one_gas_is_not_used_in_the_law_of_another(tmp_path: Path) -> None:

@@ -23,26 +23,8 @@ from scipy.optimize import nnls
 
 from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.law import (
-    BenchContext,
-    BenchLaw,
-    BenchResult,
-    Values,
-    recordings_of,
-    reported,
-    result_of,
-    solve,
-    sought,
-    within,
-)
-from ppafo.identification.bench.readings import (
-    check_enough,
-    check_moves,
-    check_no_wrong_reading,
-    check_not_clipped,
-    check_sources,
-    meter_readings,
-)
+from ppafo.identification.bench import law as bench
+from ppafo.identification.bench import readings
 from ppafo.identification.fit import Fit, FitNumber, Flags, tolerance
 from ppafo.identification.source import RecordingSource, Sources, pool
 from ppafo.identification.tolerances import GAS_LAW as LIMIT_OF_GAS_LAW
@@ -52,7 +34,7 @@ from ppafo.model.gas import SPECIES, choked_flow_constant, critical_pressure_rat
 from ppafo.model.orifice import sonic_conductance_mass
 from ppafo.parameters.records import keyed
 from ppafo.report.kind import Kind
-from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
+from ppafo.report.residuals import curve_mark, with_residuals
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.units import from_si
@@ -61,15 +43,11 @@ from ppafo.wording import known_names
 
 _VALVE_PRESSURES = ("upstream_pressure", "downstream_pressure")
 _MINIMUM_SAMPLES = 5
-"""Least number of readings at the open valve to separate the unknowns."""
 _FULLY_OPEN = 0.99
-"""Magnitude of the command [-] from which a valve is fully open."""
 _FEW = 10
 """Reciprocal of the largest fraction of readings without flow or with crossed pressures that counts as noise."""
 _NEARLY_EQUAL = 0.9
-"""Pressure ratio [-] above which the pressures are nearly equal."""
 _REGIMES = "choked flow", "subsonic flow", "flow at nearly equal pressures"
-"""Names of the flow regimes, by pressure ratio."""
 LARGEST_COEFFICIENT = 1.0
 """Largest possible discharge coefficient [-], of a jet as wide as its opening: above it the area or a unit is wrong."""
 _GRAMS_PER_BAR = 1.0e8
@@ -82,7 +60,6 @@ VALVE = "name of a valve of the set; default: the chosen one"
 _COLDEST, _HOTTEST = 150.0, 600.0
 """Lowest and highest gas temperature [K] of a bench."""
 _SAME_GAS = 0.01
-"""Relative difference of two molar masses up to which they are of one gas [-]."""
 _THERMOMETER = 1.0
 """Error limit [K] of a gas temperature stated in the problem file."""
 LINEAR_RATIO = 0.99999
@@ -100,7 +77,6 @@ LAW_NAMES: Mapping[Law, str] = {
     "iso6358": "ISO 6358",
     "both": "orifice and laminar gap",
 }
-"""Legend by flow law."""
 
 GAP = "effects.laminar_leak.coefficient"
 """Path of the coefficient of a laminar gap beside the orifice in a set."""
@@ -136,7 +112,7 @@ class GasAt:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FlowLaw(BenchLaw):
+class FlowLaw(bench.BenchLaw):
     """Keys of a law in which gas flows."""
 
     gas: str | None = keyed("species of the gas on the bench; default: the set's", None)
@@ -144,7 +120,7 @@ class FlowLaw(BenchLaw):
         Number("K", "of the gas on the bench, '17 degC'; default: the set's", None, _COLDEST, _HOTTEST), None
     )
 
-    def gas_of(self, sources: Sources, context: BenchContext) -> GasAt:
+    def gas_of(self, sources: Sources, context: bench.BenchContext) -> GasAt:
         """Return the gas of the bench; species and temperature default to the values of the set.
 
         Raises IdentificationError for an unknown species, and for a flow recorded as one of another gas.
@@ -192,7 +168,7 @@ def is_same_gas(molar_mass: float, other: float) -> bool:
 def gas_tolerances(gas: GasAt, tolerances: Tolerances) -> tuple[FitNumber, ...]:
     """Return the uncertain quantities of the gas: temperature [K] and relative departure from the ideal gas law [-]."""
     departure = LIMIT_OF_GAS_LAW if tolerances.gas_law is None else tolerances.gas_law
-    return (*tolerance(TEMPERATURE, gas.temperature_deviation), *within(departure, GAS_LAW))
+    return (*tolerance(TEMPERATURE, gas.temperature_deviation), *bench.within(departure, GAS_LAW))
 
 
 def flow_tolerances(
@@ -201,15 +177,15 @@ def flow_tolerances(
     """Return the uncertain quantities of a flow bench: gas, gains and zeros of the sensors of pressures and flow."""
     return (
         *gas_tolerances(gas, tolerances),
-        *within(tolerances.gain_of("mass_flow"), METER),
-        *within(tolerances.gain_of("pressure"), SENSORS),
-        *within(tolerances.zero_of_flow * float(np.abs(flow).max()), ZERO),
-        *within(tolerances.zero_of_pressure, *(f"zero of {name}" for name in pressures)),
+        *bench.within(tolerances.gain_of("mass_flow"), METER),
+        *bench.within(tolerances.gain_of("pressure"), SENSORS),
+        *bench.within(tolerances.zero_of_flow * float(np.abs(flow).max()), ZERO),
+        *bench.within(tolerances.zero_of_pressure, *(f"zero of {name}" for name in pressures)),
     )
 
 
 def shown_flow(
-    at: Values, gas: GasAt, pressures: Mapping[str, Floats], flow: Callable[[Floats, Floats], Floats]
+    at: bench.Values, gas: GasAt, pressures: Mapping[str, Floats], flow: Callable[[Floats, Floats], Floats]
 ) -> Floats:
     """Return the flow meter reading [kg/s] at two shown pressures [Pa], by channel, with the errors ``at``.
 
@@ -294,12 +270,12 @@ class Opening:
         gap = [(self.gap.path, 1.0, laminar)] if self.law == "both" else []
         if self.law == "iso6358" or (gap and self.critical_ratio is not None):
             known = ratio if self.critical_ratio is None else self.critical_ratio
-            shape = iso6358_shape(first, second, known)
-            return [(self.size.path, self.gas.flow_per_sonic_conductance, shape), *gap]
+            factor = self.gas.flow_per_sonic_conductance
+            return [(self.size.path, factor, iso6358_shape(first, second, known)), *gap]
         shape = orifice_shape(first, second, self.gas.heat_capacity_ratio)
         return [(self.size.path, self.known * self.gas.choked_flow_constant, shape), *gap]
 
-    def flow(self, sizes: Values, first: Floats, second: Floats) -> Floats:
+    def flow(self, sizes: bench.Values, first: Floats, second: Floats) -> Floats:
         """Return the mass flow [kg/s] for pressures [Pa] and sizes by path, positive from first to second."""
         parts = self.parts(first, second, sizes.get(self.ratio_path, 0.0))
         return np.asarray(sum(sizes[path] * factor * shape for path, factor, shape in parts))
@@ -312,10 +288,12 @@ class Opening:
         """
         if self.law == "both":
             parts = zip((self.size, self.gap), starts, alone, strict=True)
-            return tuple(sought(replace(part, size=whole), start, 0.0, scale=whole) for part, start, whole in parts)
-        critical = reported(self.ratio_path, "", "Critical ratio b of ISO 6358")
-        of_ratio = (sought(critical, ratio, *CRITICAL_RATIOS[1:]),) if self.has_sought_ratio else ()
-        return (sought(self.size, starts[0], 0.0), *of_ratio)
+            return tuple(bench.sought(part, start, 0.0, scale=whole, size=whole) for part, start, whole in parts)
+        numbers = [bench.sought(self.size, starts[0], 0.0)]
+        if self.has_sought_ratio:
+            text = "Critical ratio b of ISO 6358"
+            numbers.append(bench.sought(self.ratio_path, ratio, *CRITICAL_RATIOS[1:], text=text))
+        return tuple(numbers)
 
 
 def opening_of(
@@ -330,16 +308,20 @@ def opening_of(
 
     ``section`` is that of the opening in a set; a size that a set has not is of the ``noun``.
     """
-    own, laminar, beside = ("vane_leak", GAP, "the orifice")
-    if noun == "open valve":
-        own, laminar, beside = ("open_valve_flow", "open_valve_flow.laminar_coefficient", "it")
-    gap = reported(laminar, "kg/(s Pa^2)", f"Laminar coefficient of a gap beside {beside}")
-    size, known = of_set or (reported(f"{own}.effective_area", "m^2", f"Effective area Cd A of the {noun}"), 1.0)
+    own, laminar, unit = "open_valve_flow", "open_valve_flow.laminar_coefficient", "kg/(s Pa^2)"
+    if noun == "leak":
+        own, laminar = "vane_leak", GAP
+    gap = FitNumber(laminar, unit=unit, text="Laminar coefficient of a gap beside the orifice")
+    path, known = f"{own}.effective_area", 1.0
+    size = FitNumber(path, unit="m^2", text=f"Effective area Cd A of the {noun}")
     if law == "laminar":
-        size = reported(f"{own}.laminar_coefficient", "kg/(s Pa^2)", f"Laminar coefficient of the {noun}")
+        size = FitNumber(f"{own}.laminar_coefficient", unit=unit, text=f"Laminar coefficient of the {noun}")
     elif law == "iso6358" or critical_ratio is not None:
         of_ratio = "" if critical_ratio is None else f" with the set's b = {critical_ratio:g}"
-        size = reported(f"{section}.sonic_conductance", "m^3/(s Pa)", f"Sonic conductance C of the {noun}{of_ratio}")
+        path, text = f"{section}.sonic_conductance", f"Sonic conductance C of the {noun}{of_ratio}"
+        size = FitNumber(path, unit="m^3/(s Pa)", text=text)
+    elif of_set is not None:
+        size, known = of_set
     return Opening(gas, law, size, known, critical_ratio, gap)
 
 
@@ -365,14 +347,15 @@ def steady_readings(
     ``zero`` is the limit of the zero of the meter, as a fraction of its largest reading [-]; ``used`` marks the
     readings that count.
     """
-    first, second = (pool(sources, name) for name in names)
-    check_no_wrong_reading(sources, "mass_flow", (first, second), used)
-    flow, used, remarks = meter_readings(sources, first - second, zero, used)
-    labels = np.array(recordings_of(sources))[used].tolist()
-    return dict(zip(names, (first[used], second[used]), strict=True)), flow[used], labels, remarks
+    pressures = {name: pool(sources, name) for name in names}
+    first, second = pressures.values()
+    readings.check_no_wrong_reading(sources, "mass_flow", (first, second), used)
+    flow, used, remarks = readings.meter_readings(sources, first - second, zero, used)
+    labels = np.array(bench.recordings_of(sources))[used].tolist()
+    return {name: values[used] for name, values in pressures.items()}, flow[used], labels, remarks
 
 
-def flow_through(at: Values, opening: Opening, pressures: Mapping[str, Floats]) -> Floats:
+def flow_through(at: bench.Values, opening: Opening, pressures: Mapping[str, Floats]) -> Floats:
     """Return the flow meter reading [kg/s] through an opening at two shown pressures [Pa], by channel."""
     gap = opening.gap.path
     sizes = {**at, gap: at[gap] + at[_APPARENT]}
@@ -383,12 +366,12 @@ def solve_flow(
     opening: Opening,
     pressures: Mapping[str, Floats],
     flow: Floats,
-    labels: Sequence[tuple[str, ...]],
+    groups: Sequence[list[str]],
     tolerances: Tolerances,
     confidence: float,
     ratios: Sequence[float] = CRITICAL_RATIOS[:1],
 ) -> tuple[Fit, Floats]:
-    """Fit an opening to a measured ``flow`` with ``labels``. Returns the fit and the fitted flow [kg/s].
+    """Fit an opening to a measured ``flow`` with ``groups``. Returns the fit and the fitted flow [kg/s].
 
     ``pressures`` are two channels [Pa absolute]; a positive flow [kg/s] runs from the first to the second. A sought
     critical ratio starts from the best of ``ratios`` [-], the sizes, in which the flow is linear, from non-negative
@@ -404,9 +387,9 @@ def solve_flow(
         *opening.unknowns(starts, alone.tolist(), ratio),
         *flow_tolerances(opening.gas, tolerances, pressures, flow),
         # A gain that differs between small and large flows bends the curve of one opening as a gap beside it does.
-        *(within(tolerances.gain_of("mass_flow") * float(alone[1]), _APPARENT) if opening.law == "both" else ()),
+        *(bench.within(tolerances.gain_of("mass_flow") * float(alone[1]), _APPARENT) if opening.law == "both" else ()),
     )
-    return solve(lambda at: flow_through(at, opening, pressures), flow, labels, numbers, confidence)
+    return bench.solve(lambda at: flow_through(at, opening, pressures), flow, groups, numbers, confidence)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -419,7 +402,7 @@ class OpenValveFlowProblem(FlowLaw):
     valve: str | None = keyed(VALVE, None)
     law: Law = keyed("flow law, also the form in which the set gives it", "orifice")
 
-    def run(self, sources: Sources, context: BenchContext) -> BenchResult:
+    def run(self, sources: Sources, context: bench.BenchContext) -> bench.BenchResult:
         """Identify Cd [-] or Cd A [m^2], C [m^3/(s Pa)] and b [-], or c [kg/(s Pa^2)] of the open valve.
 
         The laws are equations (6) and (7), ISO 6358, and a laminar gap; ``both`` adds a gap to an orifice, or to ISO
@@ -428,18 +411,18 @@ class OpenValveFlowProblem(FlowLaw):
         """
         gas, path, zero = self.gas_of(sources, context), context.valve_path(self.valve), context.tolerances.zero_of_flow
         area, critical_ratio = (context.number(f"{path}.{name}") for name in ("area", "critical_ratio"))
-        check_sources(sources, self.needed, _MINIMUM_SAMPLES, absolute=_VALVE_PRESSURES)
+        readings.check_sources(sources, _MINIMUM_SAMPLES, absolute=_VALVE_PRESSURES)
+        commands = []
         for source in sources:
             # A saturated meter shows a constant flow although the pressures change the flow.
             upstream, downstream = (source.recording[name] for name in _VALVE_PRESSURES)
             driving = orifice_shape(upstream, downstream, gas.heat_capacity_ratio)
-            check_not_clipped(source, "mass_flow", "orifice flow at these pressures", driving)
-        recordings = [source.recording for source in sources]
-        # In a recording without commands, the valve is taken to be open.
-        commands = [item["command"] if "command" in item else np.ones(len(item)) for item in recordings]
+            readings.check_not_clipped(source, "mass_flow", "orifice flow at these pressures", driving)
+            # In a recording without commands, the valve is taken to be open.
+            commands.append(source.recording["command"] if "command" in source.recording else np.ones(driving.size))
         is_open = np.abs(np.concatenate(commands)) >= _FULLY_OPEN
         fully_open = "readings with the valve fully open (command 1 or -1)"
-        check_enough(sources[0], int(is_open.sum()), _MINIMUM_SAMPLES, fully_open)
+        readings.check_enough(sources[0], int(is_open.sum()), _MINIMUM_SAMPLES, fully_open)
         upstream, downstream, flow = (pool(sources, name) for name in self.needed)
         is_crossed, remarks = downstream >= upstream, tuple[str, ...]()
         # A log may begin before the gas supply is on: no flow without pressure difference is then no error of a column.
@@ -453,43 +436,40 @@ class OpenValveFlowProblem(FlowLaw):
         # Noise may exchange a few pressures that are nearly equal.
         if crossed > is_open.sum() // _FEW:
             sources[0].refuse(
-                f"downstream_pressure is at or above upstream_pressure in {crossed} of "
-                f"{is_open.sum()} readings; are the two columns swapped?"
+                f"downstream_pressure is at or above upstream_pressure in {crossed} of {is_open.sum()} readings; are "
+                "the two columns swapped?"
             )
         if np.ptp(flow[is_open]) <= 0.0:
-            check_moves(sources[0], "mass_flow")
+            readings.check_moves(sources[0], "mass_flow")
         pressures, flow, recorded, meter_remarks = steady_readings(sources, _VALVE_PRESSURES, zero, is_open)
         (upstream, downstream), flow = pressures.values(), np.abs(flow)
         ratio = downstream / upstream
+        text = f"Discharge coefficient with the set's area of {1e6 * (area or 0.0):.4g} mm^2; only Cd A is identified"
+        of_set = (FitNumber(f"{path}.discharge_coefficient", text=text), area) if area else None
         # In parallel with a laminar gap, b selects ISO 6358; the law ``iso6358`` estimates b.
         known_ratio = critical_ratio if self.law == "both" else None
-        text = f"Discharge coefficient with the set's area of {1e6 * (area or 0.0):.4g} mm^2; only Cd A is identified"
-        of_set = (reported(f"{path}.discharge_coefficient", "", text), area) if area else None
         opening = opening_of("open valve", path, gas, self.law, known_ratio, of_set)
         has_both_regimes(opening, ratio, sources[0])
         # The nearer the pressures are to each other, the more their noise affects the computed flow.
         limits = critical_pressure_ratio(gas.heat_capacity_ratio), _NEARLY_EQUAL
-        regimes = [_REGIMES[regime] for regime in np.digitize(ratio, limits).tolist()]
-        labels = list(zip(recorded, regimes, strict=True))
-        fitted, model = solve_flow(opening, pressures, flow, labels, context.tolerances, self.confidence)
+        groups = recorded, [_REGIMES[regime] for regime in np.digitize(ratio, limits).tolist()]
+        fitted, model = solve_flow(opening, pressures, flow, groups, context.tolerances, self.confidence)
         scatter = float(np.std(flow - model) / flow.max())
         # Densely, so that the curve has no kinks at the readings; between them the upstream pressure is interpolated.
         dense, order = np.linspace(ratio.min(), ratio.max(), 200), np.argsort(ratio)
         first = np.interp(dense, ratio[order], upstream[order])
         shown = dict(zip(pressures, (first, dense * first), strict=True))
         law_flow = flow_through(defaultdict(float, fitted.by_name), opening, shown)
+        curve = curve_mark(LAW_NAMES[self.law], dense, _GRAMS_PER_BAR * law_flow / first)
         measured, modelled = (_GRAMS_PER_BAR * values / upstream for values in (flow, model))
-        marks = (
-            readings_mark("measured", ratio, measured),
-            curve_mark(LAW_NAMES[self.law], dense, _GRAMS_PER_BAR * law_flow / first),
-        )
         axes = Kind("Pressure ratio"), Kind("Flow over upstream pressure", "g/s per bar")
-        result = result_of(
+        series = [("measured", "measured", ratio, measured, modelled)]
+        result = bench.result_of(
             sources,
             fitted,
             f"{flow.size} readings at pressure ratios from {ratio.min():.2f} to {ratio.max():.2f}; "
             f"scatter {scatter:.2%} of the largest flow",
-            with_residuals("Open-valve flow", *axes, marks, ratio, measured - modelled),
+            with_residuals("Open-valve flow", *axes, series, [curve]),
             remarks=(*remarks, *meter_remarks),
             scatter=scatter,
         )

@@ -18,27 +18,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ppafo.identification.bench.law import (
-    BenchContext,
-    BenchResult,
-    TimedLaw,
-    Values,
-    halved_readings,
-    reported,
-    result_of,
-    solve,
-    sought,
-    within,
-)
-from ppafo.identification.bench.readings import (
-    check_enough,
-    check_moves,
-    check_no_gap,
-    check_sources,
-    without_wrong_samples,
-)
+from ppafo.identification.bench import law as bench
+from ppafo.identification.bench import readings
 from ppafo.identification.fit import FitNumber, tolerance
-from ppafo.identification.source import RecordingSource, Sources, window
+from ppafo.identification.source import RecordingSource, Sources
 from ppafo.model.declaration import Number
 from ppafo.parameters.records import keyed
 from ppafo.report.kind import TIME, Kind
@@ -52,7 +35,6 @@ from ppafo.wording import count_of
 _ANGLE, _VELOCITY = "angle", "angular_velocity"
 """Fitted channels; the velocity is fitted together with the angle, if recorded."""
 _MINIMUM_SAMPLES = 20
-"""Least number of samples of a decay."""
 _FEWEST_SMOOTHED, _SMOOTHED_FRACTION = 5, 0.04
 """Least number and fraction of the samples of a decay to which a local parabola is fitted."""
 _REVERSAL = 0.02
@@ -103,13 +85,12 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
     largest swing ends in a return swing without rest, as on a spring, or if the sensor is saturated or contradicts the
     velocity.
     """
-    check_moves(source, _ANGLE)
-    part = window(source.recording, start, end)
-    check_enough(source, len(part), _MINIMUM_SAMPLES, "samples from start to end")
+    readings.check_moves(source, _ANGLE)
+    part, skipped = readings.timed_part(source, start, end)
+    readings.check_enough(source, len(part), _MINIMUM_SAMPLES, "samples from start to end")
     swept, noise = float(np.ptp(part[_ANGLE])), noise_of(part[_ANGLE])
     if swept < _MINIMUM_OVER_NOISE * noise:
         source.refuse(f"no motion: the angle changes by {swept:.3g} rad at a noise of {noise:.3g} rad")
-    skipped = check_no_gap(source, part)
     # A start that the user gave is after the push.
     has_start = start is not None
     speeds, _ = smoothed_rates(part.time, part[_ANGLE])
@@ -132,13 +113,14 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
     first = fastest if has_start else fastest + smoothing_width(part.time.size) // 2
     back = np.flatnonzero(sign * speeds[first:] < -_REVERSAL * np.abs(speeds).max())
     last = first + int(back[0]) if back.size else part.time.size
-    check_enough(source, last - first, _MINIMUM_SAMPLES, "samples from the highest speed to the first reversal or end")
+    until = "samples from the highest speed to the first reversal or end"
+    readings.check_enough(source, last - first, _MINIMUM_SAMPLES, until)
     time, angle = part.time[first:last], part[_ANGLE][first:last]
     for plateau in plateaus(angle):
         if is_at_limit(angle, plateau):
             source.refuse(
-                f"channel 'angle' stays at {plateau.value:g} rad in {plateau.count} rows, "
-                f"from sample {skipped + first + plateau.first + 1}: saturated, or at a stop"
+                f"channel 'angle' stays at {plateau.value:g} rad in {plateau.count} rows, from sample "
+                f"{skipped + first + plateau.first + 1}: saturated, or at a stop"
             )
     velocity = part[_VELOCITY][first:last] if _VELOCITY in part else None
     if velocity is not None:
@@ -216,7 +198,7 @@ def course(times: Floats, speed: float, slowing: Slowing) -> tuple[Floats, Float
 
 
 @dataclass(frozen=True, kw_only=True)
-class FreeDecayProblem(TimedLaw):
+class FreeDecayProblem(bench.TimedLaw):
     """Table of procedure free-decay: viscous damping and Coulomb friction from the decay after an impulse."""
 
     needed = (_ANGLE,)
@@ -232,7 +214,7 @@ class FreeDecayProblem(TimedLaw):
         None,
     )
 
-    def inertia_of(self, context: BenchContext) -> tuple[float | None, float]:
+    def inertia_of(self, context: bench.BenchContext) -> tuple[float | None, float]:
         """Return the inertia and its standard deviation [kg m^2], by default from the set; None or 0 if unknown."""
         path = "foot_plate.inertia"
         if self.inertia is not None:
@@ -240,14 +222,14 @@ class FreeDecayProblem(TimedLaw):
         inertia = context.number(path)
         return inertia, 0.0 if inertia is None else context.deviation(path, inertia)
 
-    def run(self, sources: Sources, context: BenchContext) -> BenchResult:
+    def run(self, sources: Sources, context: bench.BenchContext) -> bench.BenchResult:
         """Identify viscous damping [N m s/rad] and dynamic friction [N m], or both over inertia [1/s, rad/s^2].
 
         The model is equation (1), fitted to angle and, if recorded, angular velocity. Several recordings are several
         impulses to the same device, with common parameters and separate initial states. Raises IdentificationError for
         recordings that determine neither parameter, or times or angles in a wrong unit.
         """
-        check_sources(sources, self.needed, _MINIMUM_SAMPLES)
+        readings.check_sources(sources, _MINIMUM_SAMPLES)
         low, high = (context.number(f"actuator.angle_{end}") for end in ("min", "max"))
         for source in sources:
             step = float(np.median(np.diff(source.recording.time))) if len(source.recording) > 1 else 0.0
@@ -257,34 +239,30 @@ class FreeDecayProblem(TimedLaw):
             turned = float(np.ptp(source.recording[_ANGLE]))
             if low is not None and high is not None and turned > _MOST_OF_STOPS * (high - low) > 0.0:
                 source.refuse(
-                    f"'angle' covers {turned:.4g} rad ({turned / math.tau:.3g} turns), but "
-                    f"the stops are {math.degrees(high - low):.4g} deg apart; in degrees, give it the unit deg"
+                    f"'angle' covers {turned:.4g} rad ({turned / math.tau:.3g} turns), but the stops are "
+                    f"{math.degrees(high - low):.4g} deg apart; in degrees, give it the unit deg"
                 )
         static, dynamic = (context.number(f"friction.{kind}_torque") for kind in ("static", "dynamic"))
         # Near standstill, the friction of a seal is at most the static friction.
         rise = max(static / dynamic - 1.0, 0.0) if static and dynamic else 1.0
-        inertia, inertia_deviation = self.inertia_of(context)
-        sources, remarks = without_wrong_samples(sources, (_ANGLE, _VELOCITY), self.start, self.end)
-        decays = [decay_of(source, self.start, self.end) for source in sources]
-        of_damping, of_friction = (
-            reported("friction.viscous_damping", "N m s/rad", "Viscous damping"),
-            reported("friction.dynamic_torque", "N m", "Dynamic friction"),
-        )
-        if not inertia:
-            of_damping, of_friction = (
-                reported("free_decay.damping_over_inertia", "1/s", "Viscous damping over the inertia"),
-                reported("free_decay.friction_over_inertia", "rad/s^2", "Dynamic friction over the inertia"),
-            )
         # Without an inertia the fitted parameters are parameters divided by the inertia.
-        assumed_inertia = inertia or 1.0
+        known, deviation = self.inertia_of(context)
+        inertia = known or 1.0
+        damping, friction = "friction.viscous_damping", "friction.dynamic_torque"
+        units, over = ("N m s/rad", "N m"), ""
+        if not known:
+            damping, friction = "free_decay.damping_over_inertia", "free_decay.friction_over_inertia"
+            units, over = ("1/s", "rad/s^2"), " over the inertia"
+        sources, remarks = readings.without_wrong_samples(sources, (_ANGLE, _VELOCITY), self.start, self.end)
+        decays = [decay_of(source, self.start, self.end) for source in sources]
         initial, rates, parts = list[FitNumber](), [], []
         for number, decay in enumerate(decays, start=1):
             velocity, _ = smoothed_rates(decay.time, decay.angle)
             speed = max(float(np.abs(velocity[:_FEWEST_SMOOTHED]).max()), _LEAST_SPEED)
             swept = max(abs(float(decay.angle[-1] - decay.angle[0])), _LEAST_SWEPT)
-            initial.append(sought(_START_ANGLE.format(number), float(decay.angle[0]), scale=swept))
+            initial.append(bench.sought(_START_ANGLE.format(number), float(decay.angle[0]), scale=swept))
             # The sign of the decay has the direction, so that the speed is positive.
-            initial.append(sought(_START_SPEED.format(number), speed, 1e-9 * speed, 10.0 * speed))
+            initial.append(bench.sought(_START_SPEED.format(number), speed, 1e-9 * speed, 10.0 * speed))
             # Half of the rate w_0 / s of damping alone, and of the deceleration w_0^2 / (2 s) of friction alone.
             rates.append((0.5 * speed / swept, 0.25 * speed**2 / swept))
             # A wrong law gives different parameters for fast and for slow motion.
@@ -292,7 +270,7 @@ class FreeDecayProblem(TimedLaw):
             half = int(np.searchsorted(np.maximum.accumulate(moved), 0.5 * float(moved.max())))
             speeds = [] if decay.velocity is None else [(_VELOCITY, decay.velocity)]
             parts.append((half, [(_ANGLE, decay.angle), *speeds]))
-        starts = [assumed_inertia * float(median) for median in np.median(rates, axis=0)]
+        starts = [inertia * float(median) for median in np.median(rates, axis=0)]
         # The prior of ln(1 + q) is uniform up to ``rise``: its standard deviation is its width over sqrt(12).
         most, usual = math.log1p(rise), _USUAL_RISE_VELOCITY
         near_rest = (
@@ -300,22 +278,22 @@ class FreeDecayProblem(TimedLaw):
             FitNumber(_RISE_VELOCITY, usual, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY, usual, usual),
         )
         variables = (
-            *(sought(number, start, 0.0) for number, start in zip((of_damping, of_friction), starts, strict=True)),
+            bench.sought(damping, starts[0], 0.0, unit=units[0], text=f"Viscous damping{over}"),
+            bench.sought(friction, starts[1], 0.0, unit=units[1], text=f"Dynamic friction{over}"),
             *initial,
             *(near_rest if most > 0.0 else ()),
-            *tolerance(_INERTIA, inertia_deviation / assumed_inertia),
-            *within(context.tolerances.gain_of(_ANGLE), _GAIN),
+            *tolerance(_INERTIA, deviation / inertia),
+            *bench.within(context.tolerances.gain_of(_ANGLE), _GAIN),
         )
-        measured, labels = halved_readings(
-            sources, parts, ("the first half of the travel", "the second half of the travel")
-        )
+        halves = "the first half of the travel", "the second half of the travel"
+        measured, groups = bench.halved_readings(sources, parts, halves)
 
-        def slowing_of(at: Values, inertia: float) -> Slowing:
-            damping_rate, deceleration = (max(at[number.path], 0.0) / inertia for number in (of_damping, of_friction))
+        def slowing_of(at: bench.Values, inertia: float) -> Slowing:
+            damping_rate, deceleration = (max(at[path], 0.0) / inertia for path in (damping, friction))
             return Slowing(damping_rate, deceleration, math.expm1(at.get(_RISE, 0.0)), at.get(_RISE_VELOCITY, 0.0))
 
-        def law(at: Values) -> Floats:
-            slowing, series = slowing_of(at, assumed_inertia * (1.0 + at[_INERTIA])), []
+        def shown(at: bench.Values) -> Floats:
+            slowing, series = slowing_of(at, inertia * (1.0 + at[_INERTIA])), []
             for number, decay in enumerate(decays, start=1):
                 swept, speed = course(decay.time, at[_START_SPEED.format(number)], slowing)
                 series.append(at[_START_ANGLE.format(number)] + (1.0 + at[_GAIN]) * decay.sign * swept)
@@ -323,16 +301,16 @@ class FreeDecayProblem(TimedLaw):
                     series.append(decay.sign * speed)
             return np.concatenate(series)
 
-        fit, model = solve(law, measured, labels, variables, self.confidence)
-        slowing = slowing_of(fit.by_name, assumed_inertia)
+        fit, model = bench.solve(shown, measured, groups, variables, self.confidence)
+        slowing = slowing_of(fit.by_name, inertia)
         at_rest = sum(
             float(decay.time[-1]) > fall_to_standstill(fit.by_name[_START_SPEED.format(number)], slowing)[0][-1]
             for number, decay in enumerate(decays, start=1)
         )
         used = TIME.text(sum(float(decay.time[-1]) for decay in decays), ".3g")
         recorded = TIME.text(sum(float(np.ptp(source.recording.time)) for source in sources), ".3g")
-        unknown = "" if inertia else "; the inertia is unknown, so only ratios to the inertia are identified"
-        return result_of(
+        unknown = "" if known else "; the inertia is unknown, so only ratios to the inertia are identified"
+        return bench.result_of(
             sources,
             fit,
             f"{count_of(len(decays), 'decay')} ({used} of {recorded}), {at_rest} to standstill; beta/I = "

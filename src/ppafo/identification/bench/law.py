@@ -5,7 +5,7 @@ from abc import ABC, abstractmethod
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -37,8 +37,6 @@ from ppafo.wording import said_missing
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_SIZE = (3.1, 2.7)
-"""Width and height of a panel [in] for two panels side by side in a journal column."""
 Values = Mapping[str, float]
 """Values of the fit variables by name [SI]; a missing name means 0."""
 _MEMORY = 2
@@ -162,7 +160,8 @@ def bench_figure(panels: Sequence[Panel], kind: RecordingKind) -> "Figure":
     """Draw the two panels of a procedure side by side, lettered A and B."""
     pairs = zip("AB", panels, strict=True)
     lettered = [replace(panel, title=f"$\\bf{{{letter}}}$   {panel.title}") for letter, panel in pairs]
-    return draw_panels(lettered, 2, _SIZE, kind=kind)
+    # Two panels of these inches stand side by side in a journal column.
+    return draw_panels(lettered, 2, (3.1, 2.7), kind=kind)
 
 
 def figure_3(torque: BenchResult, decay: BenchResult) -> "Figure":
@@ -184,16 +183,19 @@ def within(limit: float, *names: str, family: str = "") -> tuple[FitNumber, ...]
 
 
 def sought(
-    number: FitNumber | str, start: float, low: float = -math.inf, high: float = math.inf, scale: float = 0.0
+    number: FitNumber | str,
+    start: float,
+    low: float = -math.inf,
+    high: float = math.inf,
+    scale: float = 0.0,
+    **more: Any,
 ) -> FitNumber:
-    """Return an unknown without a prior [SI], by path or as it is reported; the default scale is that of its start."""
+    """Return an unknown without a prior [SI]; the default scale is that of its start.
+
+    ``more`` are its further fields, such as unit and text of a number that is reported.
+    """
     number = FitNumber(number) if isinstance(number, str) else number
-    return replace(number, start=start, low=low, high=high, scale=scale or abs(start) or 1.0)
-
-
-def reported(path: str, unit: str, text: str, size: float | None = None) -> FitNumber:
-    """Return a quantity to report: path in a set, SI unit, description, and typical magnitude if it may be zero."""
-    return FitNumber(path, unit=unit, text=text, size=size)
+    return replace(number, start=start, low=low, high=high, scale=scale or abs(start) or 1.0, **more)
 
 
 def recordings_of(sources: Sources) -> list[str]:
@@ -205,7 +207,7 @@ def recordings_of(sources: Sources) -> list[str]:
 def halved_readings(
     sources: Sources, parts: Iterable[tuple[int, Iterable[tuple[str, Floats]]]], names: tuple[str, str]
 ) -> tuple[Floats, list[tuple[str, ...]]]:
-    """Return the samples over time of all sources with their labels, of which the last is the ``names`` of its half.
+    """Return the samples over time of all sources with their groups, of which the last is the ``names`` of its half.
 
     ``parts`` are, for each source, the first sample of the second half, and the channels with their samples.
     """
@@ -215,23 +217,23 @@ def halved_readings(
             series.append(values)
             whole = f"recording {number} ({source.name})", sensor
             labels += [(*whole, names[0])] * half + [(*whole, names[1])] * (values.size - half)
-    return np.concatenate(series), labels
+    return np.concatenate(series), list(zip(*labels, strict=True))
 
 
 def solve(
     law: Callable[[Values], Floats],
     measured: Floats,
-    labels: Sequence[tuple[str, ...]],
+    groups: Sequence[Sequence[str]],
     numbers: Sequence[FitNumber],
     confidence: float,
 ) -> tuple[Fit, Floats]:
     """Fit a law to readings. Returns the fit, and the fitted values in the unit of the readings.
 
-    ``labels`` of each reading are its recording or repetition, its sensor (one noise each), and further groups. The
+    ``groups`` are, for each reading, its recording or repetition, its sensor (one noise each), and further groups. The
     separate estimates of each of them are tested against the common ones. Residuals of sensors whose readings are too
     few for correlated noise are tested for runs in order of the law.
     """
-    names = [number.name for number in numbers]
+    names, labels = [number.name for number in numbers], list(zip(*groups, strict=True))
     # In the order of their first reading, so that the first block is the first recording.
     ranks = {label: rank for rank, label in enumerate(dict.fromkeys(labels))}
     # A block of the fit is a slice, so that readings of one label must lie side by side.
@@ -241,10 +243,10 @@ def solve(
     of_sensor = {name: measured[sensors == name] for name in dict.fromkeys(sensors.tolist())}
     # A meter shows six digits at most: residuals below say nothing.
     least, blocks = 1.0e-6 * float(np.ptp(measured)), []
-    for (recording, sensor, *groups), rank in ranks.items():
+    for (recording, sensor, *further), rank in ranks.items():
         rows = slice(int(ends[rank]), int(ends[rank + 1]))
         floor = np.maximum(least, rounding_of(measured[order][rows], resolution_of(of_sensor[sensor])))
-        blocks.append(ResidualBlock(recording, sensor, rows, floor, groups=tuple(groups)))
+        blocks.append(ResidualBlock(recording, sensor, rows, floor, groups=tuple(further)))
 
     def at(point: Floats) -> Values:
         return defaultdict(float, zip(names, point.tolist(), strict=True))

@@ -7,13 +7,11 @@ from typing import NoReturn
 
 import numpy as np
 
-from ppafo.errors import IdentificationError
 from ppafo.identification.fit import Flags
 from ppafo.identification.source import RecordingSource, Sources, pool, window
-from ppafo.signals import CHANNELS, Recording
+from ppafo.signals import Recording
 from ppafo.signals.faults import longest_gap, noise_of, outlying_samples, plateaus, resolution_of
 from ppafo.signals.recording import Floats
-from ppafo.wording import nearest_name
 
 _MOST_IMPOSSIBLE = 0.1
 """Largest fraction of impossible flow meter readings [-]; more means wrong signs or columns."""
@@ -31,10 +29,8 @@ _NO_DECAY = 0.5
 """Largest difference of the first two samples from the median of the first five, relative to the range [-]."""
 _ALIKE, _FEWEST_ALIKE = 6, 8
 """Number of neighbours for the comparison of a reading, and least number of readings to compare."""
-_SHARE_THAT_IS_CLIPPED = 0.05
-"""Fraction of samples at an extreme value [-] from which a sensor counts as saturated."""
-_FEWEST_CLIPPED = 4
-"""Least number of equal samples for saturation."""
+_FEWEST_CLIPPED, _SHARE_THAT_IS_CLIPPED = 4, 0.05
+"""Least number and fraction of samples at an extreme value [-] from which a sensor counts as saturated."""
 _FRACTION_THAT_MOVES = 0.02
 """Least relative change of the driving quantity [-] for which a constant channel counts as saturated."""
 _LARGEST_NUMBER = 1.0e12
@@ -58,10 +54,10 @@ def without_wrong_samples(
         is_right = np.ones(len(recording), dtype=np.bool_)
         for name in (name for name in names if name in recording):
             values = recording[name][inside]
-            is_out = _outliers(values, most, _FINE_SAMPLE)
-            if np.count_nonzero(is_out) > most:
-                is_out = _outliers(values, most, _GROSS_SAMPLE)
-            wrong = np.flatnonzero(is_out)
+            for share in (_FINE_SAMPLE, _GROSS_SAMPLE):
+                wrong = np.flatnonzero(_outliers(values, most, share))
+                if wrong.size <= most:
+                    break
             if not wrong.size:
                 continue
             first = int(wrong[0])
@@ -73,10 +69,9 @@ def without_wrong_samples(
                 f"left out: {wrong.size} of {inside.size} samples where '{name}' is an outlier; the "
                 f"first is sample {inside[first] + 1} of {source.name}, {source.shown(name, values[first])}"
             )
-        channels = {
-            name: replace(channel, values=channel.values[is_right]) for name, channel in recording.channels.items()
-        }
-        cleaned.append(replace(source, recording=replace(recording, time=recording.time[is_right], channels=channels)))
+        named = recording.channels.items()
+        kept = {name: replace(channel, values=channel.values[is_right]) for name, channel in named}
+        cleaned.append(replace(source, recording=replace(recording, time=recording.time[is_right], channels=kept)))
     return tuple(cleaned), tuple(remarks)
 
 
@@ -207,20 +202,13 @@ def _refuse_outlier(source: RecordingSource, name: str, samples: list[int], valu
     )
 
 
-def check_sources(
-    sources: Sources,
-    channels: Sequence[str],
-    fewest: int,
-    moving: Iterable[str] = (),
-    absolute: Iterable[str] = (),
-) -> None:
-    """Raise IdentificationError for recordings with a missing channel or too few samples.
+def check_sources(sources: Sources, fewest: int, moving: Iterable[str] = (), absolute: Iterable[str] = ()) -> None:
+    """Raise IdentificationError, naming the recording, for one with too few samples or an impossible number.
 
-    A ``moving`` channel must change, and an ``absolute`` pressure must be positive. The message names the recording.
+    A ``moving`` channel must change, and an ``absolute`` pressure must be positive.
     """
     for source in sources:
         recording = source.recording
-        check_channels(source.where, channels, recording.names)
         for name, values in (("time", recording.time), *((name, recording[name]) for name in recording.names)):
             worst = int(np.argmax(np.abs(values)))
             if abs(values[worst]) > _LARGEST_NUMBER:
@@ -233,8 +221,8 @@ def check_sources(
             low = int(np.argmin(recording[name]))
             if recording[name][low] <= 0.0:
                 source.refuse(
-                    f"'{name}' is {source.shown(name, recording[name][low])} at sample "
-                    f"{low + 1}, which is impossible for an absolute pressure"
+                    f"'{name}' is {source.shown(name, recording[name][low])} at sample {low + 1}, which is impossible "
+                    "for an absolute pressure"
                 )
             check_not_alone(source, name)
 
@@ -245,20 +233,6 @@ def check_enough(source: RecordingSource, count: int, fewest: int, noun: str) ->
         source.refuse(f"needs at least {fewest} {noun}, not {count}")
 
 
-def check_channels(where: str, needed: Sequence[str], read: Sequence[str]) -> None:
-    """Raise IdentificationError with all channels that a procedure needs and a recording or column map lacks."""
-    spare = [name for name in read if name not in needed]
-    asked = [
-        f"a channel '{name} [{CHANNELS[name].unit}]', {CHANNELS[name].summary}{nearest_name(name, spare)}"
-        for name in needed
-        if name not in read
-    ]
-    if asked:
-        raise IdentificationError(
-            f"{where}: needs {' and '.join(asked)}; channels read: {', '.join(read) or 'only time'}"
-        )
-
-
 def check_moves(source: RecordingSource, name: str) -> None:
     """Raise IdentificationError, naming the recording, for a constant channel, which carries no information."""
     values = source.recording[name]
@@ -267,16 +241,12 @@ def check_moves(source: RecordingSource, name: str) -> None:
 
 
 def check_not_clipped(
-    source: RecordingSource,
-    name: str,
-    driver: str,
-    driving: Floats,
-    fraction: float = _FRACTION_THAT_MOVES,
+    source: RecordingSource, name: str, driver: str, driving: Floats, fraction: float = _FRACTION_THAT_MOVES
 ) -> None:
-    """Raise IdentificationError for a saturated sensor: a channel constant at an extreme value while its cause changes.
+    """Raise IdentificationError, naming recording and channel, for a channel at an extreme value while its cause moves.
 
     ``driving`` are the values of the driving quantity ``driver``, which must change by ``fraction`` [-] of its largest
-    value. The message names the recording and the channel.
+    value.
     """
     values = source.recording[name]
     longest, _ = plateaus(values)
@@ -284,21 +254,22 @@ def check_not_clipped(
     moves = float(np.ptp(driving[longest.first : longest.last + 1])) > fraction * float(np.abs(driving).max())
     if moves and longest.count >= max(_FEWEST_CLIPPED, _SHARE_THAT_IS_CLIPPED * values.size):
         source.refuse(
-            f"channel '{name}' stays at {source.shown(name, values.max())} for "
-            f"{longest.count} samples, up to sample {longest.last + 1}, while '{driver}' moves: it is saturated"
+            f"channel '{name}' stays at {source.shown(name, values.max())} for {longest.count} samples, up to sample "
+            f"{longest.last + 1}, while '{driver}' moves: it is saturated"
         )
 
 
-def check_no_gap(source: RecordingSource, part: Recording) -> int:
-    """Return the number of samples before ``part`` of a recording. Raises IdentificationError for a gap in the part.
+def timed_part(source: RecordingSource, start: float | None, end: float | None) -> tuple[Recording, int]:
+    """Return the part between two times [s] of a recording, and the number of samples before it.
 
-    The message gives the time of the gap.
+    Raises IdentificationError for a gap in it, with its time.
     """
+    part = window(source.recording, start, end)
     skipped = int(np.searchsorted(source.recording.time, part.time[0]))
     if (gap := longest_gap(part.time)) is not None:
         index, duration = gap
         source.refuse(
-            f"gap of {duration:.4g} s after {part.time[index]:.6g} s (sample "
-            f"{skipped + index + 1}), between start and end"
+            f"gap of {duration:.4g} s after {part.time[index]:.6g} s (sample {skipped + index + 1}), between start and "
+            "end"
         )
-    return skipped
+    return part, skipped

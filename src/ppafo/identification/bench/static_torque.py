@@ -17,36 +17,18 @@ from typing import Literal
 
 import numpy as np
 
-from ppafo.errors import IdentificationError
-from ppafo.identification.bench.law import (
-    BenchContext,
-    BenchLaw,
-    BenchResult,
-    Values,
-    recordings_of,
-    reported,
-    result_of,
-    solve,
-    sought,
-    within,
-)
-from ppafo.identification.bench.readings import (
-    check_enough,
-    check_moves,
-    check_no_wrong_reading,
-    check_not_alone,
-    check_not_clipped,
-    check_sources,
-)
+from ppafo.identification.bench import law as bench
+from ppafo.identification.bench import readings
 from ppafo.identification.estimate import in_shown_unit
 from ppafo.identification.fit import Flags
 from ppafo.identification.source import RecordingSource, Sources, pool
 from ppafo.report.kind import Kind
-from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
+from ppafo.report.residuals import curve_mark, with_residuals
 from ppafo.signals.recording import Floats
 from ppafo.wording import count_of, percentage
 
 TORQUE, FORCE = "torque", "force"
+_PRESSURE = "pressure_difference"
 _MINIMUM_SAMPLES, _MINIMUM_LEVELS = 6, 3
 """Least number of readings to separate slope, friction, its growth and zero, and of pressures to test linearity."""
 _SAME_LEVEL = 0.1
@@ -68,19 +50,19 @@ _SIGMAS = 4.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class StaticTorqueProblem(BenchLaw):
+class StaticTorqueProblem(bench.BenchLaw):
     """Table of procedure static-torque: torque constant and static friction from rising and falling pressure.
 
     The friction is kinetic if the actuator slid. Readings with direction 0 belong to no branch and are left out. So is
     a flat start of the rising branch, where a scale that only pulls shows nothing until friction is overcome.
     """
 
-    needed = (TORQUE, "pressure_difference", "direction")
+    needed = (TORQUE, _PRESSURE, "direction")
     steady = ("static-torque",)
     own_errors = ("zero",)
     kind: Literal["static-torque"]
 
-    def run(self, sources: Sources, context: BenchContext) -> BenchResult:
+    def run(self, sources: Sources, context: bench.BenchContext) -> bench.BenchResult:
         """Identify torque constant [m^3], friction without pressure [N m], its growth [m^3], and scale zero [N m].
 
         For a force the units are m^2 and N. Raises IdentificationError for recordings that cannot separate them.
@@ -89,9 +71,7 @@ class StaticTorqueProblem(BenchLaw):
         is_force = bool(sources) and all(FORCE in item.recording and TORQUE not in item.recording for item in sources)
         channel = FORCE if is_force else TORQUE
         is_used = _used_readings(sources, channel, tolerances.zero_of_pressure)
-        pressure, load, branch = (
-            pool(sources, name)[is_used] for name in ("pressure_difference", channel, "direction")
-        )
+        pressure, load, branch = (pool(sources, name)[is_used] for name in (_PRESSURE, channel, "direction"))
         # A repetition of a recording is one cluster; so is a recording without repetitions.
         recordings = [source.recording for source in sources]
         files = np.repeat(np.arange(len(sources)), [len(recording) for recording in recordings])[is_used]
@@ -99,32 +79,29 @@ class StaticTorqueProblem(BenchLaw):
         pairs = np.stack([files, np.concatenate(strokes)[is_used]])
         clusters = np.unique(pairs, axis=1, return_inverse=True)[1].reshape(-1)
         repetitions = int(clusters.max()) + 1
-        labels = [f"repetition {number + 1}" for number in clusters.tolist()]
+        labels = np.array([f"repetition {number + 1}" for number in clusters.tolist()])
         # Each group is one more test: of very many none would be significant.
         if repetitions > _MOST_REPETITIONS:
-            labels = np.array(recordings_of(sources))[is_used].tolist()
+            labels = np.array(bench.recordings_of(sources))[is_used]
         # Friction varies with position within a stroke, so that consecutive samples of a branch and a repetition at one
         # pressure are no independent readings of the law.
-        marks, widest, start = np.stack([branch, clusters]), np.ptp(pressure) / _BINS / 2.0, 0
-        places = np.zeros(pressure.size, dtype=np.int64)
+        widest, first = np.ptp(pressure) / _BINS / 2.0, [0]
+        is_new = (np.diff(np.stack([branch, clusters])) != 0.0).any(axis=0)
         for sample in range(1, pressure.size):
-            is_new = (
-                abs(pressure[sample] - pressure[start]) > widest or (marks[:, sample] != marks[:, sample - 1]).any()
-            )
-            start = sample if is_new else start
-            places[sample] = places[sample - 1] + is_new
-        counts = np.bincount(places)
-        first = np.concatenate(([0], np.cumsum(counts)[:-1]))
+            if is_new[sample - 1] or abs(pressure[sample] - pressure[first[-1]]) > widest:
+                first.append(sample)
+        counts = np.diff([*first, pressure.size])
+        places = np.repeat(np.arange(counts.size), counts)
         pressure, load = (np.bincount(places, weights=values) / counts for values in (pressure, load))
-        branch, files = branch[first], files[first]
+        branch, files, labels = branch[first], files[first], labels[first]
         # The mean of n samples has the noise of one over sqrt(n).
         weight = np.sqrt(counts / counts.mean())
 
-        slope, zero, friction, scale = _straight_line(pressure, load, branch, ", ".join(names), channel)
+        slope, zero, friction, scale = _straight_line(sources[0], channel, pressure, load, branch)
         # An actuator that slides has kinetic friction. A set has no entry for a force or an area.
         slides = _slides(sources)
         key, grip = ("dynamic", "friction in motion") if slides else ("static", "static friction")
-        unit, noun, slope_unit = ("N", "area", "m^2") if is_force else ("N m", "torque constant", "m^3")
+        unit, noun, slope_unit = ("N", "Area", "m^2") if is_force else ("N m", "Torque constant", "m^3")
         slope_path, friction_path, growth_path = (
             ("static_torque.area", f"static_torque.{key}_friction", "static_torque.friction_per_pressure")
             if is_force
@@ -135,27 +112,26 @@ class StaticTorqueProblem(BenchLaw):
         zeros = ["zero of the pressure sensor"]
         if "zero" in tolerances.each_recording and len(names) > 1:
             zeros = [f"{zeros[0]} of {name}" for name in names]
-        of_slope = reported(slope_path, slope_unit, f"{noun.capitalize()}, the common slope of both branches")
-        of_friction = reported(friction_path, unit, f"{grip.capitalize()} without a pressure difference")
-        of_growth = reported(growth_path, f"{unit}/Pa", f"Growth of the {grip} with the pressure difference")
-        # A zero of the scale may be an answer.
-        of_zero = reported(_ZERO, unit, f"Zero of the {channel} sensor", float(np.ptp(load)))
+        of_friction = f"{grip.capitalize()} without a pressure difference"
+        of_growth = f"Growth of the {grip} with the pressure difference"
+        per_pressure, size = scale / float(np.abs(pressure).max()), float(np.ptp(load))
         numbers = (
-            sought(of_slope, slope),
-            sought(of_friction, friction, scale=scale),
-            sought(of_growth, 0.0, scale=scale / float(np.abs(pressure).max())),
-            sought(of_zero, zero, scale=scale),
-            *within(tolerances.zero_of_pressure, *zeros),
-            *within(tolerances.gain_of("pressure"), _GAIN),
-            *within(tolerances.gain_of(channel), load_gain),
-            *within(tolerances.friction, *frictions, family="friction"),
+            bench.sought(slope_path, slope, unit=slope_unit, text=f"{noun}, the common slope of both branches"),
+            bench.sought(friction_path, friction, scale=scale, unit=unit, text=of_friction),
+            bench.sought(growth_path, 0.0, scale=per_pressure, unit=f"{unit}/Pa", text=of_growth),
+            # A zero of the scale may be an answer.
+            bench.sought(_ZERO, zero, scale=scale, unit=unit, text=f"Zero of the {channel} sensor", size=size),
+            *bench.within(tolerances.zero_of_pressure, *zeros),
+            *bench.within(tolerances.gain_of("pressure"), _GAIN),
+            *bench.within(tolerances.gain_of(channel), load_gain),
+            *bench.within(tolerances.friction, *frictions, family="friction"),
         )
 
-        def of_files(at: Values, names: list[str]) -> Floats:
+        def of_files(at: bench.Values, names: list[str]) -> Floats:
             values = np.array([at[name] for name in names] or [0.0])
             return np.asarray(values[files] if len(names) > 1 else values)
 
-        def law(at: Values) -> Floats:
+        def shown(at: bench.Values) -> Floats:
             true = (pressure - of_files(at, zeros)) / (1.0 + at[_GAIN])
             resisting = branch * (at[friction_path] + at[growth_path] * np.abs(true))
             resisting = resisting * (1.0 + of_files(at, frictions))
@@ -164,27 +140,27 @@ class StaticTorqueProblem(BenchLaw):
 
         is_high = pressure > 0.5 * (pressure.max() + pressure.min())
         groups = (
-            [labels[sample] for sample in first.tolist()],
+            labels.tolist(),
             [channel] * pressure.size,
             np.where(branch > 0.0, "the rising branch", "the falling branch").tolist(),
             np.where(is_high, "readings at higher pressures", "readings at lower pressures").tolist(),
         )
-        fitted, model = solve(law, weight * load, list(zip(*groups, strict=True)), numbers, self.confidence)
-        values, residuals = fitted.by_name, load - model / weight
-        drawn = []
+        fitted, model = bench.solve(shown, weight * load, groups, numbers, self.confidence)
+        values, model = fitted.by_name, model / weight
+        series = []
         for role, sign, motion in (("rising", 1.0, "with"), ("falling", -1.0, "against")):
             # An actuator that slides at constant pressure has two directions of motion as branches.
-            label = f"moving {motion} the pressure" if slides else f"pressure {role}"
-            drawn.append(readings_mark(label, pressure[branch == sign], load[branch == sign], role))
+            label, on = f"moving {motion} the pressure" if slides else f"pressure {role}", branch == sign
+            series.append((label, role, pressure[on], load[on], model[on]))
         ends = np.array([pressure.min(), pressure.max()])
-        drawn.append(curve_mark("without friction", ends, values[slope_path] * ends + values[_ZERO]))
-        scatter, shown = in_shown_unit(float(np.std(residuals)), unit)
+        straight = curve_mark("without friction", ends, values[slope_path] * ends + values[_ZERO])
+        scatter, scatter_unit = in_shown_unit(float(np.std(load - model)), unit)
         axes = Kind("Pressure difference", "Pa_d", "pressure change"), Kind(channel.capitalize(), unit, channel)
-        result = result_of(
+        result = bench.result_of(
             sources,
             fitted,
-            f"{pressure.size} readings, {count_of(repetitions, 'repetition')}; scatter {scatter:.3g} {shown}",
-            with_residuals(f"Static {channel}", *axes, drawn, pressure, residuals),
+            f"{pressure.size} readings, {count_of(repetitions, 'repetition')}; scatter {scatter:.3g} {scatter_unit}",
+            with_residuals(f"Static {channel}", *axes, series, [straight]),
         )
         # Friction that is certainly negative, or falls with the pressure, is none.
         for path, fault in (
@@ -202,21 +178,20 @@ def _used_readings(sources: Sources, channel: str, zero_of_pressure: float) -> F
     ``zero_of_pressure`` [Pa] is the zero error limit of the pressure sensor. Raises IdentificationError for recordings
     that cannot separate slope from friction.
     """
-    files = ", ".join(source.name for source in sources)
-    check_sources(sources, (channel, "pressure_difference", "direction"), 1, moving=(channel,))
+    readings.check_sources(sources, 1, moving=(channel,))
     for source in sources:
-        check_not_alone(source, "pressure_difference")
-        check_not_clipped(source, channel, "pressure_difference", source.recording["pressure_difference"])
+        readings.check_not_alone(source, _PRESSURE)
+        readings.check_not_clipped(source, channel, _PRESSURE, source.recording[_PRESSURE])
         directions = source.recording["direction"]
         wrong = np.flatnonzero(~np.isin(directions, (-1.0, 0.0, 1.0)))
         if wrong.size:
             source.refuse(
-                f"channel 'direction' is {directions[wrong[0]]:g} at sample "
-                f"{wrong[0] + 1}; must be 1 while the pressure rises, -1 while it falls, 0 otherwise"
+                f"channel 'direction' is {directions[wrong[0]]:g} at sample {wrong[0] + 1}; must be 1 while the "
+                "pressure rises, -1 while it falls, 0 otherwise"
             )
-    pressure, load, direction = (pool(sources, name) for name in ("pressure_difference", channel, "direction"))
+    pressure, load, direction = (pool(sources, name) for name in (_PRESSURE, channel, "direction"))
     is_used = np.asarray(direction != 0.0)
-    check_no_wrong_reading(sources, channel, (pressure, direction), is_used)
+    readings.check_no_wrong_reading(sources, channel, (pressure, direction), is_used)
     # A scale that only pulls shows nothing until friction is overcome: the rising branch then has a flat start, a
     # lowest reading that belongs to two pressures or more, or is nothing at all.
     lowest = load.min()
@@ -224,12 +199,12 @@ def _used_readings(sources: Sources, channel: str, zero_of_pressure: float) -> F
     if lowest == 0.0 or (resting.any() and np.ptp(pressure[resting]) > np.ptp(pressure) / _BINS / 2.0):
         is_used &= ~resting
     pressure, direction = pressure[is_used], direction[is_used]
-    check_enough(sources[0], pressure.size, _MINIMUM_SAMPLES, "readings")
+    readings.check_enough(sources[0], pressure.size, _MINIMUM_SAMPLES, "readings")
     for sign, name in ((1.0, "rising"), (-1.0, "falling")):
         if not (direction == sign).any():
-            raise IdentificationError(f"{files}: the {name} branch is missing: no reading has direction {sign:+.0f}")
+            sources[0].refuse(f"the {name} branch is missing: no reading has direction {sign:+.0f}")
     if pressure.max() == pressure.min():
-        check_moves(sources[0], "pressure_difference")
+        readings.check_moves(sources[0], _PRESSURE)
     # Two levels fix a line, but do not show whether it is one. Slope, zero and growth of the friction are extrapolated
     # from the spread of the pressures to zero, which the jitter about one commanded pressure does not carry.
     width = max(float(np.ptp(pressure)) / _BINS, _SAME_LEVEL * float(np.abs(pressure).max()), zero_of_pressure)
@@ -241,59 +216,48 @@ def _used_readings(sources: Sources, channel: str, zero_of_pressure: float) -> F
     if levels < _MINIMUM_LEVELS:
         shown, unit = in_shown_unit(width, "Pa_d")
         why = f"{percentage(_SAME_LEVEL, 2)} of the highest" if width > zero_of_pressure else "[bench] zero_of_pressure"
-        raise IdentificationError(
-            f"{files}: needs readings at {_MINIMUM_LEVELS} different pressures or more, not {levels}; pressures closer "
-            f"than {shown:.3g} {unit} ({why}) count as one"
+        sources[0].refuse(
+            f"needs readings at {_MINIMUM_LEVELS} different pressures or more, not {levels}; pressures closer than "
+            f" {shown:.3g} {unit} ({why}) count as one"
         )
     for source in sources:
-        check_not_clipped(source, "pressure_difference", channel, source.recording[channel], _MORE_THAN_FRICTION)
+        readings.check_not_clipped(source, _PRESSURE, channel, source.recording[channel], _MORE_THAN_FRICTION)
     return is_used
 
 
 def _slides(sources: Sources) -> bool:
     """Return whether a position or an angle moves with the direction at constant pressure."""
-
-    def change(source: RecordingSource, name: str, span: float) -> float:
-        """Return the mean change of a channel per sweep in one direction, relative to a span [-]."""
-        direction = source.recording["direction"]
+    motions, pressures = list[float](), list[float]()
+    for recording in (source.recording for source in sources):
+        direction = recording["direction"]
         is_inside = (direction[1:] == direction[:-1]) & (direction[1:] != 0.0)
         sweeps = 1 + int(np.count_nonzero(np.diff(direction[direction != 0.0])))
-        moved = abs(float(np.sum((direction[1:] * np.diff(source.recording[name]))[is_inside]))) / sweeps
-        return moved / max(span, 1.0e-300)
-
-    span = float(np.ptp(pool(sources, "pressure_difference")))
-    motions = [
-        change(source, name, float(np.ptp(source.recording[name])))
-        for source in sources
-        for name in ("position", "angle")
-        if name in source.recording
-    ]
-    pressures = [change(source, "pressure_difference", span) for source in sources]
+        for name in (name for name in ("position", "angle", _PRESSURE) if name in recording):
+            # Mean change per sweep in one direction, relative to its range.
+            moved = abs(float(np.sum((direction[1:] * np.diff(recording[name]))[is_inside]))) / sweeps
+            span = pool(sources, name) if name == _PRESSURE else recording[name]
+            (pressures if name == _PRESSURE else motions).append(moved / max(float(np.ptp(span)), 1.0e-300))
     return bool(motions) and min(motions) > _MOVES_WITH_DIRECTION > max(pressures)
 
 
 def _straight_line(
-    pressure: Floats, load: Floats, branch: Floats, files: str, channel: str
+    source: RecordingSource, channel: str, pressure: Floats, load: Floats, branch: Floats
 ) -> tuple[float, float, float, float]:
-    """Return start values from a linear fit of both branches: slope, zero, friction, and scale of the friction.
+    """Return slope [load/Pa], zero, friction, and scale of the friction [load] from a linear fit of both branches.
 
-    The slope is in units of load per Pa, the others in units of load; the scale is at least the scatter. Raises
-    IdentificationError, with ``files`` first, if a sign is impossible.
+    The scale is at least the scatter. Raises IdentificationError, naming the source, if a sign is impossible.
     """
     design = np.stack((pressure, np.ones_like(pressure), -branch), axis=1)
     # Pressures are some 1e5 times as large as the other columns.
-    scale = np.sqrt((design**2).mean(axis=0))
-    solution = np.linalg.lstsq(design / scale, load, rcond=None)[0] / scale
+    sizes = np.sqrt((design**2).mean(axis=0))
+    solution = np.linalg.lstsq(design / sizes, load, rcond=None)[0] / sizes
     slope, zero, friction = solution.tolist()
     if slope <= 0.0:
-        raise IdentificationError(
-            f"{files}: the {channel} decreases while the pressure difference increases: a wrong sign of one of them"
-        )
+        source.refuse(f"the {channel} decreases while the pressure difference increases: a wrong sign of one of them")
     deviation = float(np.std(load - design @ solution))
     # Where friction is small its sign is the noise's, and no reason to refuse.
     if friction < -_SIGMAS * deviation / np.sqrt(pressure.size):
-        raise IdentificationError(
-            f"{files}: the rising branch lies above the falling one, as if friction drove the motion: a wrong sign of "
-            "channel 'direction'"
+        source.refuse(
+            "the rising branch lies above the falling one, as if friction drove the motion: a wrong sign of 'direction'"
         )
     return slope, zero, friction, max(abs(friction), deviation)

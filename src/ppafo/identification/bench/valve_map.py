@@ -17,18 +17,9 @@ from typing import Literal
 
 import numpy as np
 
-from ppafo.identification.bench.flow import VALVE, ZERO, FlowLaw, flow_tolerances, orifice_shape, shown_flow
-from ppafo.identification.bench.law import (
-    BenchContext,
-    BenchResult,
-    Values,
-    recordings_of,
-    reported,
-    result_of,
-    solve,
-    sought,
-)
-from ppafo.identification.bench.readings import check_no_wrong_reading, check_sources, meter_readings
+from ppafo.identification.bench import flow, readings
+from ppafo.identification.bench import law as bench
+from ppafo.identification.bench.flow import VALVE, ZERO
 from ppafo.identification.estimate import Verdict
 from ppafo.identification.fit import SHAPE, FitNumber, other_shape
 from ppafo.identification.source import RecordingSource, Sources, pool
@@ -37,13 +28,13 @@ from ppafo.model.effects.opening import NODES
 from ppafo.model.valves.proportional import spool_position
 from ppafo.parameters.records import keyed
 from ppafo.report.kind import Kind
-from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
+from ppafo.report.panels import Mark
+from ppafo.report.residuals import curve_mark, with_residuals
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.channels import check_command
 
 _PRESSURES = ("upstream_pressure", "downstream_pressure")
 _MINIMUM_SAMPLES = 12
-"""Least number of readings to separate the unknowns of a map."""
 _MINIMUM_RANGE = 0.5
 """Least range of the command [-] to separate dead band and gain."""
 _SHUT, _HALF_OPEN = 0.05, 0.5
@@ -53,7 +44,6 @@ _SATURATES = 0.02
 _SMALL_COMMAND = 0.2
 """Typical magnitude [-] of a dead band or backlash, which may be 0."""
 _FEWEST_BETWEEN = 2
-"""Least number of readings between two nodes of a table."""
 _NEARLY_FULL = 0.95
 """Least highest command [-] from which the area at full command is found."""
 _FULL = "valve_map.full_area"
@@ -65,7 +55,7 @@ _BETTER = 5.4
 
 
 @dataclass(frozen=True, kw_only=True)
-class ValveMapProblem(FlowLaw):
+class ValveMapProblem(flow.FlowLaw):
     """Table of procedure valve-map: dead band, gain, saturation and hysteresis from flow over command."""
 
     needed = ("command", "mass_flow", *_PRESSURES)
@@ -74,23 +64,23 @@ class ValveMapProblem(FlowLaw):
     valve: str | None = keyed(VALVE, None)
     nodes: tuple[float, ...] = keyed("commands of a table of openings; default: straight beyond a dead band", ())
 
-    def run(self, sources: Sources, context: BenchContext) -> BenchResult:
+    def run(self, sources: Sources, context: bench.BenchContext) -> bench.BenchResult:
         """Identify dead band [-], gain [m^2], saturation [-] and hysteresis [-] from command and flow; (6), (7).
 
         With nodes the opening is a table over the command in place of dead band, gain and saturation. Raises
         IdentificationError for recordings that do not determine the map.
         """
         gas, path = self.gas_of(sources, context), context.valve_path(self.valve)
-        check_sources(sources, self.needed, _MINIMUM_SAMPLES, ("command", "mass_flow"), absolute=_PRESSURES)
+        readings.check_sources(sources, _MINIMUM_SAMPLES, ("command", "mass_flow"), absolute=_PRESSURES)
         command, upstream, downstream = (pool(sources, name) for name in ("command", *_PRESSURES))
         direction, zero = np.sign(command * (upstream - downstream)), context.tolerances.zero_of_flow
         is_read = np.ones(command.size, dtype=bool)
-        measured, is_possible, remarks = meter_readings(sources, direction, zero, is_read)
+        measured, is_possible, remarks = readings.meter_readings(sources, direction, zero, is_read)
         branch, size = np.concatenate([_branch_of(source) for source in sources]), np.abs(command)
         if (span := float(np.ptp(command))) < _MINIMUM_RANGE:
             sources[0].refuse(f"the command covers a range of {span:.3g}, not {_MINIMUM_RANGE:g} or more")
-        check_no_wrong_reading(sources, "mass_flow", (command, branch), is_read)
-        shape = np.abs(orifice_shape(upstream, downstream, gas.heat_capacity_ratio))
+        readings.check_no_wrong_reading(sources, "mass_flow", (command, branch), is_read)
+        shape = np.abs(flow.orifice_shape(upstream, downstream, gas.heat_capacity_ratio))
         if not shape.any():
             sources[0].refuse("both pressures are equal in all readings, so nothing drives a flow")
         # Flow over flow per area at the measured pressures, so that a sagging supply is no saturation.
@@ -101,15 +91,16 @@ class ValveMapProblem(FlowLaw):
         is_two_way, highest = bool((branch > 0).any() and (branch < 0).any()), float(size.max())
         band = f"{path}.dead_band"
         openings = [f"{SECTION}.opening.opening_{number:02}" for number in range(1, len(self.nodes) + 1)]
-        play = reported(_PLAY, "", "Hysteresis: width between rising and falling command", _SMALL_COMMAND)
         pressures = dict(zip(_PRESSURES, (upstream, downstream), strict=True))
+        between = "Hysteresis: width between rising and falling command"
+        play = bench.sought(_PLAY, 0.02, 0.0, 0.5, 0.1, text=between, size=_SMALL_COMMAND)
         numbers = (
             *self._unknowns(sources[0], size, np.abs(areas), band, openings),
-            *((sought(play, 0.02, 0.0, 0.5, 0.1),) if is_two_way else ()),
-            *flow_tolerances(gas, context.tolerances, pressures, measured),
+            *((play,) if is_two_way else ()),
+            *flow.flow_tolerances(gas, context.tolerances, pressures, measured),
         )
 
-        def law(at: Values) -> Floats:
+        def shown(at: bench.Values) -> Floats:
             spool = np.concatenate([spool_of(item.recording["command"], at[_PLAY]) for item in sources])
             if self.nodes:
                 # Within the noise an opening may not fall.
@@ -120,26 +111,25 @@ class ValveMapProblem(FlowLaw):
                 area = area_of_command(spool, at[band], at[_GAIN], at[_SATURATION], at[_ROUND])
 
             def through(first: Floats, second: Floats) -> Floats:
-                shape = np.abs(orifice_shape(first, second, gas.heat_capacity_ratio))
+                shape = np.abs(flow.orifice_shape(first, second, gas.heat_capacity_ratio))
                 return np.asarray(area * gas.choked_flow_constant * shape)
 
             # A play needs every command, so that readings that cannot be drop out of the flow alone.
-            return np.asarray(np.where(is_possible, shown_flow(at, gas, pressures, through), measured))
+            return np.asarray(np.where(is_possible, flow.shown_flow(at, gas, pressures, through), measured))
 
         groups = (
-            recordings_of(sources),
+            bench.recordings_of(sources),
             ["mass_flow"] * measured.size,
             np.where(branch < 0.0, "falling commands", "rising commands").tolist(),
             np.where(command > 0.0, "commands to chamber 1", "commands to chamber 2").tolist(),
             np.where(size > 0.5 * highest, "large commands", "small commands").tolist(),
         )
-        labels = list(zip(*groups, strict=True))
-        fitted, model = solve(law, measured, labels, numbers, self.confidence)
+        fitted, model = bench.solve(shown, measured, groups, numbers, self.confidence)
         reason = ""
         # Corners are refuted where an opening with rounded ones, tried in its place, explains the readings better.
         if not self.nodes and (fitted.conflict is None or fitted.conflict.number == SHAPE):
             free = [number for number in numbers if math.isinf(number.deviation) or number.name == ZERO]
-            rounded, _ = solve(law, measured, labels, (*free, sought(_ROUND, *_ROUNDS)), self.confidence)
+            rounded, _ = bench.solve(shown, measured, groups, (*free, bench.sought(_ROUND, *_ROUNDS)), self.confidence)
             gain = rounded.log_likelihood - fitted.log_likelihood
             if gain > _BETTER:
                 reason = (
@@ -152,18 +142,18 @@ class ValveMapProblem(FlowLaw):
                 "the command was swept in one direction only: the dead band includes half the width of any hysteresis"
             )
             remarks = (*remarks, no_play)
-        marks = []
-        for role, name, on in (("rising", "fitted", branch == 1.0), ("falling", "", branch == -1.0)):
+        series, curves = [], list[Mark]()
+        for role, on in (("falling", branch == -1.0), ("rising", branch == 1.0)):
             if on.any():
-                marks.append(readings_mark(f"command {role}", command[on], measured[on], role))
-                marks.append(curve_mark(name, command[on], model[on]))
+                series.append((f"command {role}", role, command[on], measured[on], model[on]))
+                curves.append(curve_mark("" if curves else "fitted", command[on], model[on]))
         axes = Kind("Command"), Kind("Flow", "kg/s", "mass flow")
         scatter = np.std(measured - model) / np.abs(measured).max()
-        result = result_of(
+        result = bench.result_of(
             sources,
             fitted,
             f"{command.size} readings; scatter {scatter:.2%} of the largest flow",
-            with_residuals("Valve map", *axes, marks, command, measured - model),
+            with_residuals("Valve map", *axes, series, curves),
             reason,
             remarks,
         )
@@ -192,12 +182,12 @@ class ValveMapProblem(FlowLaw):
                     f"nodes = {list(self.nodes)}: must rise from above 0 to below 1, at most {NODES}, with "
                     f"{_FEWEST_BETWEEN} readings or more between two of them and the ends 0 and 1"
                 )
-            full = reported(_FULL, "m^2", "Effective area Cd A at full command")
-            unknowns = [sought(full, largest, 0.0)]
+            of_full = "Effective area Cd A at full command"
+            unknowns = [bench.sought(_FULL, largest, 0.0, unit="m^2", text=of_full)]
             for name, node in zip(openings, self.nodes, strict=True):
                 near = float(np.median(areas[np.argsort(np.abs(size - node))[:3]]))
-                opening = reported(name, "", f"Opening at a command of {node:g}", 1.0)
-                unknowns.append(sought(opening, min(max(near / largest, 0.0), 1.0), 0.0, 1.0, 1.0))
+                start, text = min(max(near / largest, 0.0), 1.0), f"Opening at a command of {node:g}"
+                unknowns.append(bench.sought(name, start, 0.0, 1.0, 1.0, text=text, size=1.0))
             return tuple(unknowns)
         half = float(size[areas > _HALF_OPEN * largest].min())
         if not half > 0.0:
@@ -205,17 +195,18 @@ class ValveMapProblem(FlowLaw):
         shut = size[areas < _SHUT * largest]
         # Inside the bounds, so that the search can go either way.
         start = float(np.clip(np.median(shut) if shut.size else 0.0, 0.01 * half, 0.9 * half))
-        shut_below = "Dead band: command below which no gas flows, in both directions"
-        gain = reported(_GAIN, "m^2", "Effective area Cd A per command beyond the dead band")
-        saturation = reported(_SATURATION, "", "Saturation: command beyond which the opening is constant")
+        # Just inside the highest command, beyond which no reading changes with it.
+        inside, end = 0.02 * half + 0.98 * highest, highest * (1.0 + 1e-9)
+        of_band = "Dead band: command below which no gas flows, in both directions"
+        of_gain = "Effective area Cd A per command beyond the dead band"
+        of_end = "Saturation: command beyond which the opening is constant"
         return (
-            sought(reported(band, "", shut_below, _SMALL_COMMAND), start, 0.0, half, highest),
-            sought(gain, 0.5 * largest / (half - start), 0.0),
-            # Just inside the highest command, beyond which no reading changes with it.
-            sought(saturation, 0.02 * half + 0.98 * highest, half, highest * (1.0 + 1e-9), highest),
+            bench.sought(band, start, 0.0, half, highest, text=of_band, size=_SMALL_COMMAND),
+            bench.sought(_GAIN, 0.5 * largest / (half - start), 0.0, unit="m^2", text=of_gain),
+            bench.sought(_SATURATION, inside, half, end, highest, text=of_end),
         )
 
-    def _as_table(self, result: BenchResult, band: str, openings: Sequence[str]) -> BenchResult:
+    def _as_table(self, result: bench.BenchResult, band: str, openings: Sequence[str]) -> bench.BenchResult:
         """Return the result with openings that do not fall, and beside them commands and no dead band, for a set."""
         highest, (full, *others) = 0.0, result.estimates
         nodes = [estimate for estimate in others if estimate.path in openings]

@@ -21,60 +21,25 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.flow import (
-    CRITICAL_RATIOS,
-    GAP,
-    GAS_LAW,
-    LAW_NAMES,
-    TEMPERATURE,
-    FlowLaw,
-    Law,
-    Opening,
-    gas_tolerances,
-    has_both_regimes,
-    is_same_gas,
-    opening_of,
-    solve_flow,
-    steady_readings,
-)
-from ppafo.identification.bench.law import (
-    BenchContext,
-    BenchResult,
-    TimedLaw,
-    Values,
-    halved_readings,
-    reported,
-    result_of,
-    solve,
-    sought,
-    within,
-)
-from ppafo.identification.bench.readings import (
-    check_enough,
-    check_moves,
-    check_no_gap,
-    check_not_clipped,
-    check_sources,
-    without_wrong_samples,
-)
-from ppafo.identification.estimate import in_shown_unit, interval_texts
+from ppafo.identification.bench import flow, readings
+from ppafo.identification.bench import law as bench
+from ppafo.identification.bench.flow import CRITICAL_RATIOS, GAP, GAS_LAW, LAW_NAMES, TEMPERATURE, Law, Opening
+from ppafo.identification.estimate import shown_text
 from ppafo.identification.fit import Fit, FitNumber, tolerance
-from ppafo.identification.source import RecordingSource, Sources, window
+from ppafo.identification.source import RecordingSource, Sources
 from ppafo.model.declaration import Number
 from ppafo.parameters.device import VANE
 from ppafo.parameters.records import keyed
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Panel
-from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
+from ppafo.report.residuals import curve_mark, with_residuals
 from ppafo.signals.faults import plateaus, stands_out
 from ppafo.signals.recording import Floats
 from ppafo.wording import count_of
 
 _CHAMBERS = ("pressure_1", "pressure_2")
-_FEWEST_STEADY = 8
-"""Least number of readings of steady flow."""
-_MINIMUM_SAMPLES = 20
-"""Least number of samples of a decay."""
+_FEWEST_STEADY, _MINIMUM_SAMPLES = 8, 20
+"""Least number of readings of steady flow, and of samples of a decay."""
 _EDGE = 20
 """Largest number of samples averaged at an end of a record for a start value, at most a tenth of the record."""
 _STANDS_STILL = 0.02
@@ -95,8 +60,6 @@ likely in at most 1 of 100 recordings (Markov's inequality), as a conflict is at
 """
 _AT_BOUND = 1.0e-3
 """Distance of a critical ratio from its bounds [-] up to which it is at its bound."""
-_SYMBOLS = {"sonic_conductance": "C", "critical_ratio": "b", "coefficient": "c"}
-"""Symbols of the quantities that a sentence states, by last part of the path."""
 _TRIAL_RATIOS = tuple(np.linspace(*CRITICAL_RATIOS[1:], 20).tolist())
 """Critical ratios [-], the best of which starts the search for steady flow.
 
@@ -114,20 +77,24 @@ _LEAST_PRESSURE = 1.0
 _SCATTER_OF_CHANGE, _LEAST_CHANGE = 0.01, 1.0e-9
 """Least pressure change for a start value: as a fraction of the noise of a tight chamber [-], and absolute [Pa]."""
 
+_Fitted = tuple[list[Fit], bool, str, tuple[Panel, ...], tuple[str, ...], float]
+"""Fits, True if readings cover choked and subsonic flow, summary, panels, remarks and scatter of a leak."""
+
 
 @dataclass(frozen=True, kw_only=True)
-class LeakLaw(FlowLaw):
+class LeakLaw(flow.FlowLaw):
     """Keys of a law of the leak: the flow law, compared with its rival where it has one."""
 
     law: Law = keyed(
         "flow law; an orifice in the form of the set; 'iso6358': C and b; 'both': orifice and laminar gap", "orifice"
     )
 
-    def run(self, sources: Sources, context: BenchContext) -> BenchResult:
+    def run(self, sources: Sources, context: bench.BenchContext) -> bench.BenchResult:
         """Identify the leak: A_leak [m^2], C [m^3/(s Pa)] or a laminar coefficient [kg/(s Pa^2)]; equations (6), (7).
 
         The laws ``iso6358`` and ``both`` are compared with each other: the values of one hold for this model only if
-        the other one explains the readings clearly better. Raises IdentificationError for recordings that do not
+        the other one explains the readings clearly better. If neither does, a remark says so, and values that depend on
+        whether there is a gap hold for this model only. Raises IdentificationError for recordings that do not
         determine it.
         """
         gas, of_set = self.gas_of(sources, context), None
@@ -138,16 +105,59 @@ class LeakLaw(FlowLaw):
                 f"Area of the leak with Cd = {coefficient:g} of the set; only the product Cd A is identified: a "
                 f"sharp-edged hole, of Cd = {_SHARP:g}, would have {coefficient / _SHARP:.3g} times this area"
             )
-            of_set = reported("actuator.leak.area", "m^2", text), coefficient
+            of_set = FitNumber("actuator.leak.area", unit="m^2", text=text), coefficient
         openings = []
         for each in (self.law, *_RIVALS.get(self.law, ())):
             # An orifice has the form of the set; the law ``iso6358`` seeks b.
             form: Law = "iso6358" if each == "orifice" and critical_ratio is not None else each
             known_ratio = None if each == "iso6358" else critical_ratio
-            openings.append(opening_of("leak", "actuator.leak", gas, form, known_ratio, of_set))
-        result = self.leak(sources, context, openings)
+            openings.append(flow.opening_of("leak", "actuator.leak", gas, form, known_ratio, of_set))
+        fits, has_both, summary, panels, remarks, scatter = self.leak(sources, context, openings)
+        opening, chosen, other, rival, reason = openings[0], fits[0], openings[-1], fits[-1], ""
+        # A critical ratio that is sought must be determined too: one of both laws seeks it.
+        _, low, high = CRITICAL_RATIOS
+        is_sound = rival.conflict is None and (
+            not other.has_sought_ratio
+            or (has_both and low + _AT_BOUND < rival.by_name[other.ratio_path] < high - _AT_BOUND)
+        )
+        advantage = rival.log_likelihood - chosen.log_likelihood
+        if rival is not chosen and not (is_sound and advantage > -_CLEAR):
+            reason = "neither ISO 6358 nor an orifice beside a laminar gap explains the readings"
+        result = bench.result_of(sources, chosen, summary, panels, reason, remarks, scatter)
+        if rival is not chosen:
+            with_gap, fit_with_gap = (other, rival) if opening.has_sought_ratio else (opening, chosen)
+            has_gap = float(fit_with_gap.low[1]) > 0.0
+            quantities = list[str]()
+            for number, value in zip(rival.numbers, rival.values.tolist(), strict=True):
+                if number.text:
+                    is_none = number.path == with_gap.gap.path and not has_gap
+                    size = shown_text(0.0 if is_none else value, number.unit, digits=3)
+                    quantities.append(f"{number.path.rpartition('.')[2]} = {size}")
+            named = f"law = '{other.law}' ({', '.join(quantities)})"
+            if advantage >= _CLEAR:
+                better = (
+                    f"{named} explains the readings better than law = '{opening.law}' (log-likelihood higher by "
+                    f"{advantage:.1f})"
+                )
+                unexplained = result.conflict or f"{better}, but not all of them"
+                result = result.for_this_model_only(better if is_sound else unexplained)
+            elif (
+                advantage > -_CLEAR
+                and any(estimate.is_usable and estimate.value > 0.0 for estimate in result.estimates)
+                and not result.conflict
+                and rival.conflict is None
+                # Without a gap, an orifice with the set's b is ISO 6358 with another b.
+                and (with_gap.critical_ratio is None or has_gap)
+            ):
+                remark = (
+                    f"the readings do not tell law = '{opening.law}' from {named}: the log-likelihoods differ by "
+                    f"{abs(advantage):.1f}, less than {_CLEAR:.1f}"
+                )
+                result = replace(result, remarks=(*result.remarks, remark))
+                # Without a gap, both laws are an orifice.
+                result = result.for_this_model_only("") if has_gap else result
         gap = next((each for each in result.estimates if each.path == GAP and each.is_usable and each.value), None)
-        if gap is None or own is None or is_same_gas(own, gas.molar_mass):
+        if gap is None or own is None or flow.is_same_gas(own, gas.molar_mass):
             return result
         # The flow of a laminar gap goes with 1 / (R T viscosity), that of an orifice needs no viscosity.
         remark = f"{GAP} is not written to the set, whose gas is not that of the bench and has another viscosity"
@@ -156,8 +166,8 @@ class LeakLaw(FlowLaw):
         return replace(result, estimates=estimates, remarks=(*result.remarks, remark))
 
     @abstractmethod
-    def leak(self, sources: Sources, context: BenchContext, openings: Sequence[Opening]) -> BenchResult:
-        """Identify the leak by the first of the openings, compared with the last one."""
+    def leak(self, sources: Sources, context: bench.BenchContext, openings: Sequence[Opening]) -> _Fitted:
+        """Return fits of all openings, and of the first one what is reported of it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,106 +178,32 @@ class SteadyLeakProblem(LeakLaw):
     steady = ("vane-leak-steady",)
     kind: Literal["vane-leak-steady"]
 
-    def leak(self, sources: Sources, context: BenchContext, openings: Sequence[Opening]) -> BenchResult:
-        """Identify the leak from steady flow; several pressures separate the zero of the flow meter."""
-        check_sources(sources, self.needed, _FEWEST_STEADY, moving=("mass_flow",), absolute=_CHAMBERS)
+    def leak(self, sources: Sources, context: bench.BenchContext, openings: Sequence[Opening]) -> _Fitted:
+        """Fit steady flow; several pressures separate the zero of the flow meter."""
+        readings.check_sources(sources, _FEWEST_STEADY, moving=("mass_flow",), absolute=_CHAMBERS)
         for source in sources:
-            check_not_clipped(source, "mass_flow", "pressure_1", source.recording["pressure_1"])
+            readings.check_not_clipped(source, "mass_flow", "pressure_1", source.recording["pressure_1"])
         is_used = np.ones(sum(len(source.recording) for source in sources), dtype=bool)
         zero = context.tolerances.zero_of_flow
-        pressures, flow, recorded, remarks = steady_readings(sources, _CHAMBERS, zero, is_used)
+        pressures, metered, recorded, remarks = flow.steady_readings(sources, _CHAMBERS, zero, is_used)
         first, second = pressures.values()
         # A wrong law gives different sizes at low and at high pressures.
         difference, ratio = first - second, np.minimum(first, second) / np.maximum(first, second)
         is_high = difference > np.median(difference)
         halves = np.where(is_high, "flow at higher pressures", "flow at lower pressures").tolist()
-        labels = list(zip(recorded, ["mass_flow"] * flow.size, halves, strict=True))
-        has_both = has_both_regimes(openings[0], ratio, sources[0])
+        groups = recorded, ["mass_flow"] * metered.size, halves
+        has_both = flow.has_both_regimes(openings[0], ratio, sources[0])
         fits = [
-            solve_flow(opening, pressures, flow, labels, context.tolerances, self.confidence, _TRIAL_RATIOS)
+            flow.solve_flow(opening, pressures, metered, groups, context.tolerances, self.confidence, _TRIAL_RATIOS)
             for opening in openings
         ]
         model = fits[0][1]
-        scatter = float(np.std(flow - model) / np.abs(flow).max())
-        marks = readings_mark("measured", difference, flow), curve_mark(LAW_NAMES[openings[0].law], difference, model)
+        scatter = float(np.std(metered - model) / np.abs(metered).max())
+        series, curve = ("measured", "measured", difference, metered, model), LAW_NAMES[openings[0].law]
         axes = Kind("Pressure difference", "Pa_d", "pressure change"), Kind("Flow", "kg/s", "mass flow")
-        return _compared(
-            sources,
-            openings,
-            fits,
-            has_both,
-            f"{flow.size} steady readings; scatter {scatter:.2%} of the largest flow",
-            with_residuals("Steady leak", *axes, marks, difference, flow - model),
-            remarks,
-            scatter,
-        )
-
-
-def _compared(
-    sources: Sources,
-    openings: Sequence[Opening],
-    fits: Sequence[tuple[Fit, Floats]],
-    has_both: bool,
-    summary: str,
-    panels: tuple[Panel, ...],
-    remarks: tuple[str, ...],
-    scatter: float = math.nan,
-) -> BenchResult:
-    """Return the result of the first of ``fits``, with the verdicts that its rival, the last one, allows.
-
-    If the rival explains the readings clearly better, that is a conflict. If neither does, a remark says so, and values
-    that depend on whether there is a gap hold for this model only. ``has_both``: readings of choked and subsonic flow.
-    """
-    opening, (chosen, _), other, (rival, _) = openings[0], fits[0], openings[-1], fits[-1]
-    if rival is chosen:
-        return result_of(sources, chosen, summary, panels, "", remarks, scatter)
-    # A critical ratio that is sought must be determined too: one of both laws seeks it.
-    _, low, high = CRITICAL_RATIOS
-    is_sound = rival.conflict is None and (
-        not other.has_sought_ratio
-        or (has_both and low + _AT_BOUND < rival.by_name[other.ratio_path] < high - _AT_BOUND)
-    )
-    advantage = rival.log_likelihood - chosen.log_likelihood
-    neither = "neither ISO 6358 nor an orifice beside a laminar gap explains the readings"
-    reason = "" if is_sound and advantage > -_CLEAR else neither
-    result = result_of(sources, chosen, summary, panels, reason, remarks, scatter)
-    with_gap, fit_with_gap = (other, rival) if opening.has_sought_ratio else (opening, chosen)
-    has_gap = float(fit_with_gap.low[1]) > 0.0
-    quantities = list[str]()
-    for row, number in enumerate(rival.numbers):
-        name = number.path.rpartition(".")[2]
-        symbol = _SYMBOLS.get(name.removesuffix("_over_volume"))
-        if number.text and symbol is not None:
-            (value, unit), (lowest, _), (highest, _) = (
-                in_shown_unit(float(values[row]), number.unit) for values in (rival.values, rival.low, rival.high)
-            )
-            text = "0" if symbol == "c" and not has_gap else interval_texts(value, lowest, highest)[0]
-            symbol = f"{symbol}/V" if name.endswith("_over_volume") else symbol
-            quantities.append(f"{symbol} = {text} {unit}".rstrip(" -"))
-    named = f"law = '{other.law}' ({', '.join(quantities)})"
-    if advantage >= _CLEAR:
-        better = (
-            f"{named} explains the readings better than law = '{opening.law}' (log-likelihood higher by "
-            f"{advantage:.1f})"
-        )
-        unexplained = result.conflict or f"{better}, but not all of them"
-        return result.for_this_model_only(better if is_sound else unexplained)
-    if (
-        advantage <= -_CLEAR
-        or not any(estimate.is_usable and estimate.value > 0.0 for estimate in result.estimates)
-        or result.conflict
-        or rival.conflict is not None
-        # Without a gap, an orifice with the set's b is ISO 6358 with another b.
-        or (with_gap.critical_ratio is not None and not has_gap)
-    ):
-        return result
-    remark = (
-        f"the readings do not tell law = '{opening.law}' from {named}: the log-likelihoods differ by "
-        f"{abs(advantage):.1f}, less than {_CLEAR:.1f}"
-    )
-    result = replace(result, remarks=(*result.remarks, remark))
-    # Without a gap, both laws are an orifice.
-    return result.for_this_model_only("") if has_gap else result
+        panels = with_residuals("Steady leak", *axes, [series], [curve_mark(curve, difference, model)])
+        summary = f"{metered.size} steady readings; scatter {scatter:.2%} of the largest flow"
+        return [fit for fit, _ in fits], has_both, summary, panels, remarks, scatter
 
 
 class ChamberDecay(NamedTuple):
@@ -276,8 +212,9 @@ class ChamberDecay(NamedTuple):
     ``time`` is in s; ``sensors`` are channel and pressures [Pa] of the fuller chamber and of the other; ``number`` is
     the number of the decay. ``changes`` are the fall of the pressure in the fuller chamber and its rise in the other
     [Pa]; ``room`` is the index of a constant pressure in ``sensors``, None if both change, ``changing`` that of the
-    pressure that determines the leak, and ``fitted`` are the sensors without that of the room. ``half`` is the first
-    sample with less than half of the pressure difference, ``fall`` its fall relative to the start [-].
+    pressure that determines the leak, and ``fitted`` are the sensors without that of the room. ``edge`` is the number
+    of samples averaged at an end, ``half`` the first sample with less than half of the pressure difference, ``fall``
+    its fall relative to the start [-].
     """
 
     time: Floats
@@ -287,13 +224,9 @@ class ChamberDecay(NamedTuple):
     room: int | None
     changing: int
     fitted: list[tuple[str, Floats]]
+    edge: int
     half: int
     fall: float
-
-
-def _edge_of(time: Floats) -> int:
-    """Return the number of samples averaged at an end of a decay."""
-    return max(1, min(_EDGE, time.size // 10))
 
 
 def chamber_decay(source: RecordingSource, start: float | None, end: float | None, number: int) -> ChamberDecay:
@@ -301,32 +234,28 @@ def chamber_decay(source: RecordingSource, start: float | None, end: float | Non
 
     ``number`` is the number of the decay. Raises IdentificationError for a saturated sensor or too few samples.
     """
-    part = window(source.recording, start, end)
-    skipped = check_no_gap(source, part)
+    part, skipped = readings.timed_part(source, start, end)
     for name in _CHAMBERS:
         for plateau in plateaus(part[name]):
             # Later plateaus may be the resolution of the sensor, as the pressure hardly falls any more.
             if plateau.first < _EDGE and stands_out(part[name], plateau):
                 source.refuse(
-                    f"channel '{name}' stays at exactly {1e-3 * plateau.value:g} kPa for "
-                    f"{plateau.count} samples, up to sample {skipped + plateau.last + 1}: it is saturated, or the "
-                    "chamber was not yet closed"
+                    f"channel '{name}' stays at exactly {1e-3 * plateau.value:g} kPa for {plateau.count} samples, up "
+                    f"to sample {skipped + plateau.last + 1}: it is saturated, or the chamber was not yet closed"
                 )
-    edge = _edge_of(part.time)
+    edge = max(1, min(_EDGE, part.time.size // 10))
     is_first = np.mean((part["pressure_1"] - part["pressure_2"])[:edge]) > 0.0
     fuller, emptier = _CHAMBERS if is_first else _CHAMBERS[::-1]
     difference = part[fuller] - part[emptier]
     # Between nearly equal pressures, the zero errors of the sensors outweigh the difference.
     low = np.flatnonzero(difference < _EQUAL * float(np.mean(difference[:edge])))
     count = int(low[0]) if low.size else difference.size
-    check_enough(source, count, _MINIMUM_SAMPLES, "samples from the start to equal pressures")
+    readings.check_enough(source, count, _MINIMUM_SAMPLES, "samples from the start to equal pressures")
     time, first, second = part.time[:count] - part.time[0], part[fuller][:count], part[emptier][:count]
-    edge, difference = _edge_of(time), first - second
+    edge, difference = max(1, min(_EDGE, count // 10)), first - second
     fall, rise = (float(np.mean(each[-edge:]) - np.mean(each[:edge])) for each in (first, second))
-    room = next(
-        (side for side, own, beside in ((1, rise, fall), (0, fall, rise)) if abs(own) <= _STANDS_STILL * abs(beside)),
-        None,
-    )
+    stands = [abs(own) <= _STANDS_STILL * abs(beside) for own, beside in ((fall, rise), (rise, fall))]
+    room = 1 if stands[1] else 0 if stands[0] else None
     initial, final = float(difference[0]), float(difference[-1])
     if edge > 1:
         # By straight lines through the samples at the edges: a mean over them would underestimate the fall.
@@ -336,11 +265,11 @@ def chamber_decay(source: RecordingSource, start: float | None, end: float | Non
     # The constant pressure of a room is not fitted.
     fitted = [sensor for side, sensor in enumerate(sensors) if side != room]
     half, lost = int(np.argmax(difference < 0.5 * (initial + final))), 1.0 - final / initial
-    return ChamberDecay(time, sensors, number, (-fall, rise), room, 1 if room == 0 else 0, fitted, half, lost)
+    return ChamberDecay(time, sensors, number, (-fall, rise), room, int(room == 0), fitted, edge, half, lost)
 
 
 def pressures_of_fall(
-    opening: Opening, sizes: Values, first: float, second: float, ratio: float, rate: float, times: Floats
+    opening: Opening, sizes: bench.Values, first: float, second: float, ratio: float, rate: float, times: Floats
 ) -> tuple[Floats, Floats]:
     """Return both pressures [Pa] at times [s] while gas leaks between closed chambers.
 
@@ -362,8 +291,8 @@ def pressures_of_fall(
     logs = np.linspace(0.0, -math.log(_LOWEST), _POINTS)
     difference = start * np.exp(-logs)
     lower = second + share_of_rise * (start - difference)
-    flow = opening.flow(sizes, lower + difference, lower)
-    time_per_log = difference / np.maximum(both_chambers * rate * flow, _LEAST_RATE)
+    mass_flow = opening.flow(sizes, lower + difference, lower)
+    time_per_log = difference / np.maximum(both_chambers * rate * mass_flow, _LEAST_RATE)
     steps = 0.5 * (time_per_log[1:] + time_per_log[:-1]) * np.diff(logs)
     fall_times = np.concatenate(([0.0], np.cumsum(steps)))
     remaining = np.exp(np.interp(times, fall_times, np.log(difference)))
@@ -372,7 +301,7 @@ def pressures_of_fall(
 
 
 @dataclass(frozen=True, kw_only=True)
-class VaneLeakProblem(LeakLaw, TimedLaw):
+class VaneLeakProblem(LeakLaw, bench.TimedLaw):
     """Table of procedure vane-leak: area, conductance or laminar coefficient from decaying pressures."""
 
     needed = _CHAMBERS
@@ -391,7 +320,7 @@ class VaneLeakProblem(LeakLaw, TimedLaw):
         Number("m^3", "volume of chamber 2 with its line", minimum=0.0, minimum_allowed=False), None
     )
 
-    def volumes_of(self, context: BenchContext) -> tuple[float | None, float | None, float]:
+    def volumes_of(self, context: bench.BenchContext) -> tuple[float | None, float | None, float]:
         """Return both chamber volumes [m^3], stated or from the angle, and their relative standard deviation [-].
 
         Equations (4), (5): V1 = V_dead1 + v (theta - theta_min) and V2 = V_dead2 + v (theta_max - theta), with v the
@@ -416,17 +345,17 @@ class VaneLeakProblem(LeakLaw, TimedLaw):
             deviation = math.hypot(of_volume, of_angle) / (dead_1 + per_angle * (angle - lower))
         return first, second, deviation
 
-    def leak(self, sources: Sources, context: BenchContext, openings: Sequence[Opening]) -> BenchResult:
-        """Identify the leak from the pressures in closed chambers."""
+    def leak(self, sources: Sources, context: bench.BenchContext, openings: Sequence[Opening]) -> _Fitted:
+        """Fit the pressures in closed chambers."""
         if all("mass_flow" in source.recording for source in sources):
             sources[0].refuse("has a 'mass_flow': the flow that maintains a pressure is of procedure vane-leak-steady")
         volume_1, volume_2, volume_deviation = self.volumes_of(context)
-        check_sources(sources, self.needed, _MINIMUM_SAMPLES)
-        sources, remarks = without_wrong_samples(sources, _CHAMBERS, self.start, self.end)
-        check_sources(sources, self.needed, _MINIMUM_SAMPLES, absolute=_CHAMBERS)
+        readings.check_sources(sources, _MINIMUM_SAMPLES)
+        sources, remarks = readings.without_wrong_samples(sources, _CHAMBERS, self.start, self.end)
+        readings.check_sources(sources, _MINIMUM_SAMPLES, absolute=_CHAMBERS)
         for source in sources:
             # A chamber that is open to the room has a constant pressure.
-            check_moves(source, max(_CHAMBERS, key=lambda name: float(np.ptp(source.recording[name]))))
+            readings.check_moves(source, max(_CHAMBERS, key=lambda name: float(np.ptp(source.recording[name]))))
         decays = [chamber_decay(source, self.start, self.end, number) for number, source in enumerate(sources, start=1)]
         # The chamber whose pressure determines the leak empties, or fills from a room.
         sides = {(decay.sensors[0][0], decay.sensors[decay.changing][0]) for decay in decays}
@@ -437,7 +366,7 @@ class VaneLeakProblem(LeakLaw, TimedLaw):
         chamber = 1 + _CHAMBERS.index(sides.pop()[1])
         volume, other_volume = (volume_1, volume_2) if chamber == 1 else (volume_2, volume_1)
         ratio = np.concatenate([decay.sensors[1][1] / decay.sensors[0][1] for decay in decays])
-        has_both = has_both_regimes(openings[0], ratio, sources[0])
+        has_both = flow.has_both_regimes(openings[0], ratio, sources[0])
         if volume is None:
             # The fitted size is then the size divided by the volume.
             openings = [
@@ -446,16 +375,16 @@ class VaneLeakProblem(LeakLaw, TimedLaw):
             ]
         others = (
             *_unknowns(decays, volume, other_volume, volume_deviation),
-            *gas_tolerances(openings[0].gas, context.tolerances),
+            *flow.gas_tolerances(openings[0].gas, context.tolerances),
             *tolerance(_VOLUME, volume_deviation if volume else 0.0),
-            *within(context.tolerances.zero_of_pressure, *(f"zero of {sensor}" for sensor, _ in decays[0].sensors)),
+            *bench.within(context.tolerances.zero_of_pressure, *(f"zero of {name}" for name, _ in decays[0].sensors)),
         )
         # A wrong law gives different sizes early and late in a fall.
         parts = [(decay.half, decay.fitted) for decay in decays]
-        measured, labels = halved_readings(sources, parts, ("the early fall", "the late fall"))
+        measured, groups = bench.halved_readings(sources, parts, ("the early fall", "the late fall"))
         longest = max(float(decay.time[-1]) for decay in decays)
 
-        def law(at: Values, opening: Opening) -> Floats:
+        def shown(at: bench.Values, opening: Opening) -> Floats:
             """Return P (1 + r exp(-t / tau)) + zero, P by ``pressures_of_fall`` with k in place of R T / V [Pa].
 
             k = R sqrt(T_0 T) (1 + gas law) / (V (1 + volume)): the flow is computed at the nominal temperature T_0 [K],
@@ -465,7 +394,7 @@ class VaneLeakProblem(LeakLaw, TimedLaw):
             root = gas.specific_gas_constant * np.sqrt(gas.temperature * (gas.temperature + at[TEMPERATURE]))
             rate = root * (1.0 + at[GAS_LAW]) / ((volume or 1.0) * (1.0 + at[_VOLUME]))
             relaxation_time = longest / _RELAXED * math.exp(at[_RELAXATION])
-            shown = list[Floats]()
+            pressures = list[Floats]()
             for decay in decays:
                 first, second = (at[_START.format(sensor, decay.number)] for sensor, _ in decay.sensors)
                 of_volumes = at[_RATIO] if decay.room is None else 0.0 if decay.room == 1 else math.inf
@@ -474,8 +403,8 @@ class VaneLeakProblem(LeakLaw, TimedLaw):
                 for side, ((sensor, _), pressure) in enumerate(zip(decay.sensors, falls, strict=True)):
                     if side != decay.room:
                         relaxed = 1.0 + at[_RELAXED_BY.format(sensor, decay.number)] * faded
-                        shown.append(pressure * relaxed + at[f"zero of {sensor}"])
-            return np.concatenate(shown)
+                        pressures.append(pressure * relaxed + at[f"zero of {sensor}"])
+            return np.concatenate(pressures)
 
         fits = []
         for opening in openings:
@@ -484,44 +413,43 @@ class VaneLeakProblem(LeakLaw, TimedLaw):
             sizes = []
             for decay in decays:
                 (_, first), (_, second) = decay.sensors
-                flows = [
-                    float(np.mean(per * flow)) for _, per, flow in opening.parts(first, second, CRITICAL_RATIOS[0])
-                ]
                 scatter = float(np.std(np.diff(decay.sensors[decay.changing][1])))
                 change = max(decay.changes[decay.changing], _SCATTER_OF_CHANGE * scatter, _LEAST_CHANGE)
-                sizes.append([change / (rate * flow * float(decay.time[-1])) for flow in flows])
+                flows = [
+                    float(np.mean(per * each)) for _, per, each in opening.parts(first, second, CRITICAL_RATIOS[0])
+                ]
+                sizes.append([change / (rate * each * float(decay.time[-1])) for each in flows])
             alone = [float(np.mean(of_part)) for of_part in zip(*sizes, strict=True)]
             # The search starts from equal contributions of orifice and gap.
             unknowns = opening.unknowns([size / len(alone) for size in alone], alone, CRITICAL_RATIOS[0])
-            fits.append(solve(partial(law, opening=opening), measured, labels, (*unknowns, *others), self.confidence))
-        model = fits[0][1]
-        times = [decay.time for decay in decays for _ in decay.fitted]
-        time, models = np.concatenate(times), np.split(model, np.cumsum([values.size for values in times])[:-1])
-        # The legend names the first curve only.
-        names = [LAW_NAMES[openings[0].law], *[""] * (len(times) - 1)]
-        marks = [readings_mark("measured", time, measured)]
-        marks += [curve_mark(*curve) for curve in zip(names, times, models, strict=True)]
+            of_opening = partial(shown, opening=opening)
+            fits.append(bench.solve(of_opening, measured, groups, (*unknowns, *others), self.confidence))
+        curves = [(sensor, decay.time, values) for decay in decays for sensor, values in decay.fitted]
+        models = np.split(fits[0][1], np.cumsum([time.size for _, time, _ in curves])[:-1])
+        # The legend names the first curve of each chamber only.
+        labels, law = {name: name.replace("pressure_", "chamber ") for name in _CHAMBERS}, LAW_NAMES[openings[0].law]
+        series = [
+            (labels.pop(sensor, ""), sensor, time, values, model)
+            for (sensor, time, values), model in zip(curves, models, strict=True)
+        ]
+        drawn = [curve_mark("" if row else law, time, model) for row, (*_, time, _, model) in enumerate(series)]
         if all(decay.room is not None for decay in decays):
             remarks = (*remarks, f"the pressure in chamber {3 - chamber} is constant, so it is treated as a reservoir")
         fall = max(decay.fall for decay in decays)
-        axes = TIME, Kind("Pressure", "Pa_a", "pressure")
-        return _compared(
-            sources,
-            openings,
-            fits,
-            has_both,
-            f"{count_of(len(decays), 'decay')} of up to {longest:.3g} s; the pressure difference falls by {fall:.1%}",
-            with_residuals("Closed chambers", *axes, marks, time, measured - model),
-            remarks,
+        summary = (
+            f"{count_of(len(decays), 'decay')} of up to {longest:.3g} s; the pressure difference falls by {fall:.1%}"
         )
+        panels = with_residuals("Closed chambers", TIME, Kind("Pressure", "Pa_a", "pressure"), series, drawn)
+        return [fit for fit, _ in fits], has_both, summary, panels, remarks, math.nan
 
 
 def _over_volume(size: FitNumber, chamber: int) -> FitNumber:
     """Return the reported size of the leak divided by the unknown volume of a chamber."""
     text = f"{size.text.partition(' with')[0]} over the volume of chamber {chamber}, which is not known"
+    path, unit = f"vane_leak.{size.path.split('.')[-1]}_over_volume", f"{size.unit[:-1]} m^3)"
     if size.unit == "m^2":
-        return reported("vane_leak.area_over_volume", "1/m", text)
-    return reported(f"vane_leak.{size.path.split('.')[-1]}_over_volume", f"{size.unit[:-1]} m^3)", text)
+        path, unit = "vane_leak.area_over_volume", "1/m"
+    return FitNumber(path, unit=unit, text=text)
 
 
 def _unknowns(
@@ -538,18 +466,17 @@ def _unknowns(
         ratio = volume / other_volume
         unknowns += tolerance(_RATIO, math.sqrt(2.0) * deviation * ratio, ratio)
     elif changes:
-        unknowns.append(sought(_RATIO, max(float(np.mean([rise / fall for fall, rise in changes])), 1.0e-3), 1.0e-6))
+        ratio = max(float(np.mean([rise / fall for fall, rise in changes])), 1.0e-3)
+        unknowns.append(bench.sought(_RATIO, ratio, 1.0e-6))
     for decay in decays:
-        edge = _edge_of(decay.time)
         for side, (sensor, values) in enumerate(decay.sensors):
             scale = max(abs(decay.changes[decay.changing]), float(np.std(np.diff(values))), _LEAST_PRESSURE)
-            name = _START.format(sensor, decay.number)
-            initial = sought(name, float(values[:edge].mean()), _LEAST_PRESSURE, scale=scale)
+            start, spread = float(values[: decay.edge].mean()), math.inf
             if side == decay.room:
-                deviation_in_room = max(float(values.std()), _LEAST_PRESSURE)
-                initial = replace(initial, start=float(values.mean()), deviation=deviation_in_room)
-            unknowns.append(initial)
+                start, spread = float(values.mean()), max(float(values.std()), _LEAST_PRESSURE)
+            name = _START.format(sensor, decay.number)
+            unknowns.append(bench.sought(name, start, _LEAST_PRESSURE, scale=scale, deviation=spread))
         for sensor, _ in decay.fitted:
-            unknowns += within(_MOST_RELAXED, _RELAXED_BY.format(sensor, decay.number))
+            unknowns += bench.within(_MOST_RELAXED, _RELAXED_BY.format(sensor, decay.number))
     # Only the order of magnitude of tau is known, so the variable is its logarithm.
     return [*unknowns, FitNumber(_RELAXATION, 0.0, low=-5.0, high=math.log(_RELAXED), scale=1.0, deviation=1.5)]

@@ -126,6 +126,7 @@ def test_planted_dead_band_saturation_and_hysteresis_come_back() -> None:
         assert result[path].low <= truth <= result[path].high
     assert result["valve_map.gain"].value == pytest.approx(4.2e-6, rel=0.01)
     assert result.conflict == ""
+    assert len({mark.colour for mark in result.panels[1].marks}) == 3
 
 
 def round_hole(noise: float, is_both_ways: bool, seed: int) -> RecordingSource:
@@ -234,6 +235,7 @@ def test_a_planted_orifice_leak_gives_its_area_whichever_chamber_empties(turned:
 
 def test_a_leak_without_a_volume_is_an_area_over_it() -> None:
     found = vane_leak((planted.leak("orifice", EFFECTIVE),), planted.CO2)
+    assert len({mark.colour for mark in found.panels[0].marks}) == 3
     area = found["vane_leak.area_over_volume"]
     assert area.low <= EFFECTIVE / VOLUME <= area.high
     assert "volume of chamber 1, which is not known" in area.explanation

@@ -84,7 +84,7 @@ def test_a_leak_of_the_standard_is_no_gap_and_the_law_that_is_named_gives_its_tw
 ) -> None:
     sources = make(partial(standard, 3.5e-11, critical))
     wrong = solved(sources, "both")
-    assert wrong.conflict.startswith("law = 'iso6358' (C = 0.003")
+    assert wrong.conflict.startswith("law = 'iso6358' (sonic_conductance = 0.003")
     assert not any(estimate.is_identified for estimate in wrong.estimates)
     right = solved(sources, "iso6358")
     check(right, **{C: 3.5e-11, B: critical})
@@ -128,7 +128,7 @@ def test_a_sharp_orifice_has_no_gap_and_either_law_describes_it(
     check(found, **{AREA: 1.6e-8})
     assert found[GAP].low == 0.0
     assert found.conflict == ""
-    assert "do not tell law = 'both' from law = 'iso6358' (C = 0.003" in found.remarks[0]
+    assert "do not tell law = 'both' from law = 'iso6358' (sonic_conductance = 0.003" in found.remarks[0]
     # Critical ratio of an ellipse that is nearest to the curve of a nozzle.
     assert solved(sources, "iso6358")[B].value == pytest.approx(0.52, abs=0.04)
 

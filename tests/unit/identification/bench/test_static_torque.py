@@ -80,7 +80,7 @@ def test_samples_of_a_stroke_are_one_reading() -> None:
 
 
 def test_a_direction_that_is_turned_round_is_told_and_not_fitted() -> None:
-    with pytest.raises(IdentificationError, match="a wrong sign of channel 'direction'"):
+    with pytest.raises(IdentificationError, match="a wrong sign of 'direction'"):
         static_torque((planted.static(sign=-1.0),))
 
 
