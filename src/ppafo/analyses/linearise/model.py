@@ -517,17 +517,14 @@ def model_at(scenario: Scenario, run: Run, values: Mapping[str, float], time: fl
         rates, outputs = plant.at({**values, name: value})
         return np.array([*rates.values(), *outputs.values()])
 
-    # Slopes of rates and outputs on the side of ``side_of`` and on the other side, and estimates of their errors.
-    (near, near_errors), (far, far_errors) = (
-        np.stack(
-            [
-                one_sided_slopes(partial(rates_and_outputs, name), values[name], side * sides[name], size_of(name))
-                for name in columns
-            ],
-            axis=-1,
+    def slopes(towards: float) -> Any:
+        """Return the slopes of rates and outputs, and estimates of their errors, on the sides or opposite to them."""
+        ends = (
+            (partial(rates_and_outputs, name), values[name], towards * sides[name], size_of(name)) for name in columns
         )
-        for side in (1.0, -1.0)
-    )
+        return np.stack([one_sided_slopes(*each) for each in ends], axis=-1)
+
+    (near, near_errors), (far, far_errors) = slopes(1.0), slopes(-1.0)
     # A second chamber that the actuator lacks stays at the atmosphere, without any slope. A value that the valve takes
     # from its command at once is no state: only the output that shows it needs it.
     needing = np.count_nonzero((near != 0.0) | (far != 0.0), axis=0)
