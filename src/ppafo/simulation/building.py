@@ -6,7 +6,7 @@ Each mistake in the document raises an error of one line.
 import functools
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from ppafo.errors import ParameterError, PpafoError, ScenarioError, noted_in, ra
 from ppafo.model.catalog import VALVES
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
-from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
+from ppafo.parameters import build_device, list_sets, load_parameter_set
 from ppafo.parameters.declaration import OF_SECOND_CHAMBER, RELIEVING_PATH, WHY_ONE_CHAMBER
 from ppafo.parameters.declared import kind_at, value_at
 from ppafo.parameters.device import Device
@@ -86,21 +86,8 @@ _ASSUMED = "assumed"
 """Section of a file with a note for each assumed path."""
 
 
-@dataclass(frozen=True, slots=True)
-class Hardware:
-    """Parameter set with all overrides applied, name of its selected valve, and links between its numbers.
-
-    ``replaced`` is a sentence on values of the scenario that replace those of another set or valve, else "".
-    """
-
-    parameter_set: ParameterSet
-    valve: str
-    links: Graph
-    replaced: str
-
-
-def read_hardware(reading: DocumentReader) -> Hardware:
-    """Return the parameter set with the overrides of the file, then those of the caller.
+def read_hardware(reading: DocumentReader) -> tuple[Origin, Graph]:
+    """Return the origin, whose parameter set has the overrides of the file, then those of the caller, and its links.
 
     Values of the file that replace those of another set or valve are logged. Raises ParameterError for unusable values.
     """
@@ -109,14 +96,17 @@ def read_hardware(reading: DocumentReader) -> Hardware:
     with refused_as(ParameterError, f"{reading.file}: [device]", ParameterError):
         of_file = read_overrides(section.get("overrides", ()))
         check_valve(of_file, in_file.get("valve"), f"device.valve = '{in_file.get('valve')}'")
-        plain_set = reading.parameter_set or load_parameter_set(set_name(section["set"], reading.folder))
+        set_name = section["set"]
+        is_path = Path(set_name).suffix == ".toml" or "/" in set_name
+        place = str(reading.folder / set_name) if is_path and set_name not in list_sets() else set_name
+        plain_set = reading.parameter_set or load_parameter_set(place)
         valve_name = chosen_valve(plain_set, valve)
         owner, replacing = "", tuple[Override, ...]()
-        if section["set"] != in_file.get("set"):
+        if set_name != in_file.get("set"):
             # Another set than the file's own may have one chamber only.
             missing = OF_SECOND_CHAMBER if plain_set.has_one_chamber else ()
             of_file = tuple(item for item in of_file if item.typed not in missing)
-            owner, replacing = section["set"], of_file
+            owner, replacing = set_name, of_file
         elif valve != in_file.get("valve"):
             owner = f"valve '{valve_name}'"
             replacing = tuple(item for item in of_file if item.typed.startswith(CHOSEN_VALVE))
@@ -129,22 +119,19 @@ def read_hardware(reading: DocumentReader) -> Hardware:
             _warn_once(f"ppafo: {reading.file}: {replaced}")
     before = atmospheric_pressure(set_of_file) if overrides else None
     changed = with_overrides(set_of_file, overrides, valve)
-    return Hardware(changed, valve_name, links_of_set(changed, overridden, before), replaced)
+    kept, texts = "; ".join(filter(None, (replaced, reading.kept))), tuple(item.words for item in reading.overrides)
+    origin = Origin(reading.path, set_name, valve_name, texts, reading.content, kept, changed)
+    return origin, links_of_set(changed, overridden, before)
 
 
 _warn_once = functools.lru_cache(maxsize=64)(logger.warning)
 
 
-def set_name(name: str, folder: Path) -> str:
-    """Return the name of a shipped parameter set, or the path of a set file; relative paths start from ``folder``."""
-    is_path = Path(name).suffix == ".toml" or "/" in name
-    return str(folder / name) if is_path and name not in list_sets() else name
-
-
-def read_device(reading: DocumentReader, hardware: Hardware) -> Device:
+def read_device(reading: DocumentReader, origin: Origin, links: Graph) -> Device:
     """Return the device of a parameter set with its overrides; ParameterError for missing or contradictory values."""
     with refused_as(ParameterError, f"{reading.file}: [device]", ParameterError):
-        device = build_device(hardware.parameter_set, hardware.valve, hardware.links)
+        assert origin.parameters is not None, "of a file"
+        device = build_device(origin.parameters, origin.valve, links)
     written = chosen_units(_leaves([value_at(reading.document, part) for part in _PARTS_WITH_UNITS]))
     levels = [path for path in sorted(reading.overridden) if path.startswith(PATHS_THAT_SET_UNITS)]
     overridden = units_of_texts(value_at(reading.document, path) for path in levels)
@@ -163,8 +150,8 @@ def build_scenario(reading: DocumentReader) -> Scenario:
     Raises ScenarioError or ParameterError for the first value that cannot be used.
     """
     document, kind = reading.document, kind_at(reading.document, "controller")
-    law, hardware = CONTROLLERS[kind], read_hardware(reading)
-    device = read_device(reading, hardware)
+    law, (origin, links) = CONTROLLERS[kind], read_hardware(reading)
+    device = read_device(reading, origin, links)
     # Refusals are in the units of the set.
     with shown_in(device.shown):
         wrong = list[PpafoError]()
@@ -191,7 +178,7 @@ def build_scenario(reading: DocumentReader) -> Scenario:
         assert section is not None, "walks are built from another layout"
         motion = section.read(reading, reading.folder)
         supply_line = read_supply_line(reading)
-        assumptions = read_assumptions(reading, hardware)
+        assumptions = read_assumptions(reading, origin)
         scenario = Scenario(
             name=document["name"],
             description=document.get("description", ""),
@@ -203,7 +190,7 @@ def build_scenario(reading: DocumentReader) -> Scenario:
             reference=reference,
             sensors=Sensors(**of_sensors, seed=int(reading.number("sensors.seed", SEED))),
             assumptions=(*assumptions, *assumed_lines(reading)),
-            origin=origin_of(reading, hardware),
+            origin=origin,
             gas_model=read_gas_model(reading),
             supply_line=supply_line,
             links={**initial_links, **reference_links},
@@ -243,13 +230,6 @@ def check_regulated(device: Device, law: ControllerKind, controlled: str) -> Non
         raise ParameterError(
             f"'{valve}' sets a pressure, '{law.name}' asks for a flow; set controller.kind to '{other}'"
         )
-
-
-def origin_of(reading: DocumentReader, hardware: Hardware) -> Origin:
-    """Return the origin of a scenario."""
-    overrides = tuple(override.words for override in reading.overrides)
-    set_name, kept = reading.document["device"]["set"], "; ".join(filter(None, (hardware.replaced, reading.kept)))
-    return Origin(reading.path, set_name, hardware.valve, overrides, reading.content, kept, hardware.parameter_set)
 
 
 def _initial(reading: DocumentReader, device: Device) -> tuple[Initial, Graph]:
@@ -338,7 +318,7 @@ def read_supply_line(reading: DocumentReader) -> SupplyLine | None:
     return SupplyLine(**{line: RegulatedLine(**numbers) for line, numbers in read.items()})
 
 
-def read_assumptions(reading: DocumentReader, hardware: Hardware) -> tuple[Assumption, ...]:
+def read_assumptions(reading: DocumentReader, origin: Origin) -> tuple[Assumption, ...]:
     """Return all assumptions with a value; the note of an overridden assumption states the value in the file.
 
     Raises ScenarioError for a path without a value.
@@ -350,7 +330,7 @@ def read_assumptions(reading: DocumentReader, hardware: Hardware) -> tuple[Assum
     notes: Mapping[str, str] = reading.document.get(_ASSUMED, {})
     assumptions, unknown = [], []
     for path, note in notes.items():
-        value, value_in_file = _value_text(reading, hardware, path), _value_text(as_written, hardware, path)
+        value, value_in_file = _value_text(reading, origin, path), _value_text(as_written, origin, path)
         if value is None and value_in_file is None:
             unknown.append(path)
         if value is None:
@@ -368,7 +348,7 @@ def read_assumptions(reading: DocumentReader, hardware: Hardware) -> tuple[Assum
     return tuple(assumptions)
 
 
-def _value_text(reading: DocumentReader, hardware: Hardware, path: str) -> str | None:
+def _value_text(reading: DocumentReader, origin: Origin, path: str) -> str | None:
     """Return the value at a path as written in the file, else its default; None if there is neither."""
     written = value_at(reading.document, path)
     if written is not None and path in OF_A_VANE.paths(reading.document):
@@ -376,13 +356,14 @@ def _value_text(reading: DocumentReader, hardware: Hardware, path: str) -> str |
     quantity = quantities(reading.document).get(path)
     if quantity is None:
         # A number that is not the scenario's is its device's, where the valve has a name.
-        full = f"valves.{hardware.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
-        entry = hardware.parameter_set.entries().get(full)
+        full = f"valves.{origin.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
+        assert origin.parameters is not None, "of a file"
+        entry = origin.parameters.entries().get(full)
         if entry is not None:
             return entry_text(entry)
         if path == RELIEVING_PATH:
             return "false"
-        quantity = hardware.parameter_set.declarations().get(full)
+        quantity = origin.parameters.declarations().get(full)
     if quantity is not None and quantity.default is None and quantity.follows:
         return "the value computed from the device"
     return None if quantity is None or quantity.default is None else written_text(quantity.default, quantity.unit)

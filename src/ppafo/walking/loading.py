@@ -19,7 +19,6 @@ from ppafo.parameters.overrides import read_overrides
 from ppafo.plugins import Plugins
 from ppafo.simulation.building import (
     assumed_lines,
-    origin_of,
     read_device,
     read_gas_model,
     read_hardware,
@@ -55,8 +54,8 @@ def build_walk(reading: DocumentReader) -> Scenario:
     Raises ScenarioError, ParameterError or DataError for the first value that cannot be used.
     """
     document = reading.document
-    hardware = read_hardware(reading)
-    device = read_device(reading, hardware)
+    origin, links = read_hardware(reading)
+    device = read_device(reading, origin, links)
     with refused_as(ParameterError, f"{reading.file}: [device]", ParameterError):
         device.check_pressurised("a walk, whose controllers fill the chambers,")
         if VALVES[device.valve.kind].regulation is not None:
@@ -108,7 +107,7 @@ def build_walk(reading: DocumentReader) -> Scenario:
             seed=int(reading.number("sensors.seed", SEED)),
         ),
         assumptions=tuple(assumptions.values()),
-        origin=origin_of(reading, hardware),
+        origin=origin,
         gas_model=read_gas_model(reading),
         supply_line=line,
     )
