@@ -48,14 +48,7 @@ from ppafo.identification.trajectory.experiment import (
 from ppafo.model.columns import at, over_runs
 from ppafo.parameters.overrides import read_overrides
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.signals.faults import (
-    correlated_noise_of,
-    is_at_limit,
-    noise_of,
-    plateaus,
-    resolution_of,
-    rounding_of,
-)
+from ppafo.signals.faults import correlated_noise_of, is_at_limit, noise_of, plateaus, resolution_of, rounding_of
 from ppafo.signals.recording import CHANNELS, Channel, Floats, Recording
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, SUPPLY, sample_period
@@ -182,10 +175,7 @@ def signals_of(
         return list(pool.map(signals_at, experiments, columns, [points.shape[1]] * len(experiments)))
 
 
-_NUMBERS_OF_RUN = (
-    *("plant", "thermal", "initial"),
-    *("valve", "command_delay", "lines", "effects", "leg"),
-)
+_NUMBERS_OF_RUN = ("plant", "thermal", "initial", "valve", "command_delay", "lines", "effects", "leg")
 """Fields of a run that depend on the parameters of its scenario; program, clock and prescribed motion do not."""
 
 
