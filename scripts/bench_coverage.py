@@ -12,6 +12,7 @@ import argparse
 import statistics
 import sys
 import time
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,10 +27,11 @@ if not __package__:
 from ppafo.errors import PpafoError
 from ppafo.identification.bench.law import BenchContext
 from ppafo.identification.estimate import Estimate
-from ppafo.identification.problem import parse_problem
+from ppafo.identification.problem import ProblemFile
 from ppafo.identification.procedures import LAWS, run_procedure
 from ppafo.identification.source import RecordingSource
 from ppafo.parameters import load_parameter_set
+from ppafo.parameters.records import record_from
 from ppafo.rig import record
 from ppafo.signals import Recording
 from scripts.interval_coverage import KINDS, disturbed
@@ -101,7 +103,7 @@ def identified(experiment: str, preset: str, seed: int, noise: str = "") -> Iden
     begun = time.process_time()
     made = record(experiment, preset, seed, DEVICE)
     text = f'{HEAD}[[procedure]]\nkind = "{experiment}"\nrecordings = ["made.csv"]\n{EXTRA.get(experiment, "")}'
-    problem = parse_problem(text.encode(), "bench").procedure[0]
+    problem = record_from(ProblemFile, tomllib.loads(text)).procedure[0]
     setting = BenchContext(load_parameter_set(DEVICE), "proportional", experiment)
     try:
         found, refused = (

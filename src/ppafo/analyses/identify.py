@@ -138,14 +138,13 @@ class Identification:
         document["trajectory"] = {
             **parts[-1],
             "recordings": recordings,
-            "confidence": fit.problem.confidence,
-            **fields_of(fit.fit, "evaluations", "has_converged"),
-            "covariance": fit.covariance.tolist(),
-            "tolerances": [plain(tolerance) for tolerance in fit.known],
-            "channels": [plain(channel) for channel in fit.channels],
-            "conflict": None if fit.fit.conflict is None else plain(fit.fit.conflict),
-            "not_identifiable": [dict(combination) for combination in fit.fit.unidentified],
-            "next_experiments": [plain(experiment) for experiment in fit.expected],
+            **fields_of(fit.fit, "confidence", "evaluations", "has_converged"),
+            "covariance": plain(fit.covariance),
+            "tolerances": plain(fit.known),
+            "channels": plain(fit.channels),
+            "conflict": plain(fit.fit.conflict),
+            "not_identifiable": plain(fit.fit.unidentified),
+            "next_experiments": plain(fit.expected),
         }
         return document
 

@@ -13,17 +13,14 @@ from ppafo.wording import percentage, without_exponent
 if TYPE_CHECKING:
     from ppafo.signals import RecordingKind
 
-_DIFFERENCES = {"Pa": "Pa_d"}
-"""Unit of a difference by SI unit."""
 _NOTHING, _NEAREST = 1.0e-6, 0.05
 """Fraction of an error [-] that is rounding, and least distance of an end from its value that sets digits [values]."""
 NAMED = 2
 """Number of parts of a variance that are named, the largest ones: a least share would hide one that is near it."""
 Verdict = Literal["identified", "holds for this model only", "not identifiable", "at its bound", "unit probably wrong"]
-"""Verdict on an estimated value, given the fit of the model to the recordings.
+"""Verdict on an estimated value, which is "identified" only if the model explains the recordings.
 
-A value is "identified" only if the model explains the recordings. A value that "holds for this model only" is written
-into a set with the origin ``fitted``, and is not to be taken as a property of the device.
+One that "holds for this model only" is written into a set with the origin ``fitted``: no property of the device.
 """
 WRONG_UNIT: Verdict = "unit probably wrong"
 """Verdict where the recordings do better in another unit of pressure; the value is not used in a set."""
@@ -40,7 +37,7 @@ def in_shown_unit(number: float, unit: str, stated: str = "") -> tuple[float, st
 
     A pressure stated as gauge is shown absolute, as it is stored.
     """
-    si_unit = _DIFFERENCES.get(unit, unit)
+    si_unit = "Pa_d" if unit == "Pa" else unit
     shown = stated or shown_unit(si_unit)
     if stated and si_unit == "Pa_d":
         shown = f"{split_pressure_kind(stated)[0]}_d"

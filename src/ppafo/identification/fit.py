@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,23 +127,18 @@ class FitNumber:
 
 
 def tolerance(
-    path: str,
-    deviation: float,
-    start: float = 0.0,
-    scale: float = math.sqrt(3.0),
-    recordings: tuple[str, ...] = (),
-    family: str = "",
+    path: str, deviation: float, start: float = 0.0, scale: float = math.sqrt(3.0), **more: Any
 ) -> tuple[FitNumber, ...]:
     """Return a variable with a prior of standard deviation ``deviation`` about ``start`` [SI]; nothing if exact.
 
-    Variables of one ``family`` are tested together. The ``scale`` of the search [deviations] is the limit by default,
-    so that a step of one scale is a likely one.
+    The ``scale`` of the search [deviations] is the limit by default, so that a step of one scale is a likely one.
+    ``more`` are its further fields, such as the recordings in which it acts.
     """
-    if not deviation > 0.0:
-        return ()
     width = _WIDEST * (scale * deviation)
-    ends = start - width, start + width
-    return (FitNumber(path, start, *ends, scale * deviation, deviation, recordings, True, family=family),)
+    found = FitNumber(
+        path, start, start - width, start + width, scale * deviation, deviation, is_tolerance=True, **more
+    )
+    return (found,) if deviation > 0.0 else ()
 
 
 @dataclass(frozen=True, slots=True)

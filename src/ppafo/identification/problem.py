@@ -161,35 +161,28 @@ def load_problem(path: str | Path) -> ProblemFile:
 
     Raises IdentificationError for an invalid file, and for recordings that are not there.
     """
-    return parse_problem(_FILE.read(path), label(str(path)), Path(path).parent)
-
-
-def parse_problem(content: bytes, file: str, folder: Path | None = None) -> ProblemFile:
-    """Return the problem in the bytes of a TOML file; ``file`` is its name in messages.
-
-    Raises IdentificationError for an invalid file, and for recordings that are not in its ``folder``.
-    """
+    file, content, folder = label(str(path)), _FILE.read(path), Path(path).parent
     problem = checked_record(ProblemFile, _FILE.parse(content, file), file, IdentificationError, content)
     # Each may be left out, which the layout allows, but not both.
     if not problem.procedure and problem.trajectory is None:
         raise IdentificationError(f"{file}: has neither a [[procedure]] nor a [trajectory]")
-    tables = [
-        (f"procedure.{number}", item.columns, {f"recordings.{at}": name for at, name in enumerate(item.recordings, 1)})
-        for number, item in enumerate(problem.procedure, start=1)
-    ]
-    experiments = () if problem.trajectory is None else problem.trajectory.experiments
-    for number, experiment in enumerate(experiments, start=1):
-        tables.append((f"trajectory.experiments.{number}", experiment.columns, {"recording": experiment.recording}))
-    faults = {}
-    for table, columns, recordings in tables:
-        if columns is not None and columns not in problem.columns:
-            wrong = f"no such column map{known_names(columns, problem.columns)}"
-            faults[f"{table}.columns"] = f"{table}.columns = {quote(columns)}: {wrong}"
-        for key, name in recordings.items():
-            if folder is not None and not (folder / name).is_file():
-                wrong = "is a folder" if (folder / name).is_dir() else "no such file"
-                near = nearest_name(name, [each.name for each in folder.iterdir()])
-                faults[f"{table}.{key}"] = f"{table}.{key} = {quote(name)}: {wrong}{near}"
+    maps, recordings = dict[str, str | None](), dict[str, str]()
+    for number, item in enumerate(problem.procedure, start=1):
+        maps[f"procedure.{number}.columns"] = item.columns
+        recordings |= {f"procedure.{number}.recordings.{at}": name for at, name in enumerate(item.recordings, start=1)}
+    for number, experiment in enumerate(problem.trajectory.experiments if problem.trajectory else (), start=1):
+        maps[f"trajectory.experiments.{number}.columns"] = experiment.columns
+        recordings[f"trajectory.experiments.{number}.recording"] = experiment.recording
+    faults = {
+        key: f"{key} = {quote(name)}: no such column map{known_names(name, problem.columns)}"
+        for key, name in maps.items()
+        if name is not None and name not in problem.columns
+    }
+    for key, name in recordings.items():
+        if not (folder / name).is_file():
+            wrong = "is a folder" if (folder / name).is_dir() else "no such file"
+            near = nearest_name(name, [each.name for each in folder.iterdir()])
+            faults[key] = f"{key} = {quote(name)}: {wrong}{near}"
     if faults:
         refuse(faults, file, IdentificationError, partial(line_of, decoded(content)))
     return problem

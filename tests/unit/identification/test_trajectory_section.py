@@ -237,7 +237,7 @@ def test_the_interval_of_the_bench_can_be_the_prior_of_the_fit(solve: Solve) -> 
     given = next(one for one in outcome.trajectory.fit.numbers if one.path == "friction.static_torque")
     assert given.start == known.value
     assert given.deviation == pytest.approx(known.wider_half_width / 1.96, rel=1e-2)
-    with pytest.raises(PpafoError, match="prior = 'bench' needs a value that a procedure of this problem identifies"):
+    with pytest.raises(PpafoError, match="prior = 'bench': no procedure identifies it"):
         solve(FIT + prior)
 
 

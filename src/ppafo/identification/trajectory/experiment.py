@@ -151,10 +151,7 @@ class FittedExperiment:
 
     @property
     def motion_at_start(self) -> tuple[float, float, float] | None:
-        """Angle [rad], angular velocity and its standard error [rad/s] of a recorded start; None if it is at rest.
-
-        A recorded velocity says more.
-        """
+        """Angle [rad], velocity and its standard error [rad/s] of a recorded start; None if at rest, or better told."""
         is_told = ANGLE in self.inputs or "angular_velocity" in self.recording
         return None if is_told or not self.is_read else motion_at(self.recording, self.start)
 
@@ -180,9 +177,7 @@ class FittedExperiment:
             return scenario
         before = recording.time <= self.start + _FITS
         if not before.any():
-            raise IdentificationError(
-                f"{self.where}: {recording.label} has no sample up to {self.start:g} s, its start"
-            )
+            raise IdentificationError(f"{self.where}: {recording.label} has no sample up to {self.start:g} s")
         time = recording.time[before]
         rest = {name: value_at_rest(time, recording[name][before], at_end=True) for name in recording.names}
         recorded = {name: rest[name] for name in ("pressure_1", "pressure_2") if name in rest}
@@ -295,10 +290,8 @@ def number_of(parameter: FitNumber, experiments: Sequence[FittedExperiment]) -> 
     """
     path, *others = sorted({full_path(parameter.path, each.scenario) for each in experiments})
     if others:
-        raise IdentificationError(
-            f"{parameter.path} is {' and '.join((path, *others))} in these experiments; give one of these, and in "
-            "recordings the experiments that have it"
-        )
+        paths = " and ".join((path, *others))
+        raise IdentificationError(f"{parameter.path} is {paths} in these experiments; give one, with its recordings")
     quantity = [declaration_of(path, each.begun) for each in experiments][-1]
     for experiment in experiments:
         is_common = experiment.scenario.device.supply.has_one_pressure and DORSIFLEXION_SUPPLY not in experiment.inputs
@@ -308,9 +301,8 @@ def number_of(parameter: FitNumber, experiments: Sequence[FittedExperiment]) -> 
             "supply.dorsiflexion_pressure": SUPPLY if is_common else DORSIFLEXION_SUPPLY,
         }.get(path)
         if channel in experiment.inputs:
-            raise IdentificationError(
-                f"{parameter.name}: has no effect, since the run of {experiment.where} uses the recorded '{channel}'"
-            )
+            user = f"{experiment.where} uses the recorded '{channel}'"
+            raise IdentificationError(f"{parameter.name}: has no effect, since {user}")
     start, low, high = parameter.start, quantity.minimum, quantity.maximum
     first = experiments[0].begun
     # Of how a run begins the recording may say more than the scenario.
@@ -446,7 +438,7 @@ def tolerance_parameters(
             found[f"initial.{name}"] = noise if stated is None else deviation_of_limit(stated)
         for path in (path for path, deviation in found.items() if path not in free and deviation > 0.0):
             start_of_path = number_at(experiment.begun, path)
-            parameters += tolerance(path, found[path], start_of_path, 1.0, (experiment.label,))
+            parameters += tolerance(path, found[path], start_of_path, 1.0, recordings=(experiment.label,))
     # A fitted number takes up the error of its path: a tolerance beside it could not be told apart.
     scenario = experiments[0].scenario
     given = {full_path(item.path, scenario) for item in fitted}
@@ -468,7 +460,7 @@ def tolerance_parameters(
                 continue
             common = () if len(labels) == len(experiments) else labels
             for group in [(label,) for label in labels] if is_own else [common]:
-                for number in tolerance(path, deviation_of_limit(limit), 0.0, 1.0, group):
+                for number in tolerance(path, deviation_of_limit(limit), 0.0, 1.0, recordings=group):
                     lag = replace(number, low=-_LONGEST_LAG, high=_LONGEST_LAG)
                     parameters.append(lag if kind == "lag" else number)
     return (*parameters, *_of_device(tolerances, experiments, given, parameter_set))
@@ -611,9 +603,6 @@ def parameter_of(
         estimate = bench.get(full_path(entry.path, scenario))
         if estimate is None or not estimate.is_usable:
             identified = ", ".join(path for path, known in bench.items() if known.is_usable) or "none"
-            raise IdentificationError(
-                f"{where}: prior = 'bench' needs a value that a procedure of this problem identifies; identified: "
-                f"{identified}"
-            )
+            raise IdentificationError(f"{where}: prior = 'bench': no procedure identifies it; identified: {identified}")
         start, deviation = estimate.value, estimate.wider_half_width / interval_factor(estimate.confidence)
     return FitNumber(entry.path, start, low, high, 1.0, deviation, entry.recordings)

@@ -97,16 +97,12 @@ class PreparedExperiment:
 
 
 def prepare(
-    experiment: FittedExperiment,
-    numbers: Mapping[str, float],
-    reach: float = 0.0,
-    step: float | None = None,
-    tolerance: float = FIT_TOLERANCE,
+    experiment: FittedExperiment, numbers: Mapping[str, float], reach: float = 0.0, fine_step: float | None = None
 ) -> PreparedExperiment:
     """Return an experiment prepared for fitting, with records that are no finer than its samples need.
 
-    ``numbers`` are the start values by path; ``reach`` [s] is the largest time offset that may be tried, ``step`` [s]
-    the longest step of time, by default that of the scenario. Raises IdentificationError for a saturated sensor.
+    ``numbers`` are the start values by path; ``reach`` [s] is the largest time offset that may be tried, ``fine_step``
+    [s] the longest step of a finer run. Raises IdentificationError for a saturated sensor.
     """
     recording, scenario = experiment.recording, experiment.begun
     inside = recording.time >= experiment.start - _FITS
@@ -121,12 +117,11 @@ def prepare(
         rests = any(abs(clipped.value - stop) < _ZERO_OF_ANGLE for stop in stops)
         has_noise = name in experiment.noise or noise_of(channel.values) > 0.0
         if is_at_limit(channel.values, clipped) and not (rests or has_noise):
-            raise IdentificationError(
-                f"{experiment.where}: channel '{name}' stays at its {clipped.word} value for {clipped.count} of "
-                f"{channel.values.size} samples: the sensor is probably saturated"
-            )
+            times = f"{clipped.count} of {channel.values.size} samples: the sensor is probably saturated"
+            level = f"its {clipped.word} value for {times}"
+            raise IdentificationError(f"{experiment.where}: channel '{name}' stays at {level}")
     scenario = replace(
-        scenario, run=replace(scenario.run, duration=float(time[-1]) + reach, step=step or scenario.run.step)
+        scenario, run=replace(scenario.run, duration=float(time[-1]) + reach, step=fine_step or scenario.run.step)
     )
     run = plan_run(with_numbers(scenario, numbers))
     # Steps between records: those of a sample interval, or fewer if samples must be interpolated, and a fraction of a
@@ -143,6 +138,7 @@ def prepare(
             every = max(count for count in counts if every % count == 0) if is_aligned else counts[-1]
     records = math.ceil((float(time[-1]) + reach) / (run.step * every) - _FITS)
     steps = math.ceil(records * every - _FITS)
+    tolerance = FIT_TOLERANCE if fine_step is None else _FINER * FIT_TOLERANCE
     run = replace(run, tolerance=tolerance, record_every=every, step_count=steps, needs_parts=True)
     if ANGLE in experiment.inputs and isinstance(scenario.motion, FreeMotion):
         run = with_prescribed_angle(run, scenario.motion.angle)
@@ -389,10 +385,8 @@ def _fit_of(problem: TrajectoryProblem, numbers: tuple[FitNumber, ...], report: 
             continue
         low, high = max(static.low - dynamic.high, 0.0), static.high - dynamic.low
         if not low < high:
-            raise IdentificationError(
-                f"{static.name}: high = {static.high:.6g} N m must be above low = {dynamic.low:.6g} N m of "
-                f"{dynamic.name}, for friction at rest is at least friction in motion"
-            )
+            least = f"low = {dynamic.low:.6g} N m of {dynamic.name}"
+            raise IdentificationError(f"{static.name}: high = {static.high:.6g} N m must be above {least}")
         excess = min(max(static.start - dynamic.start, low), high)
         sought[row] = replace(static, start=excess, low=low, high=high, scale=dynamic.scale, base=dynamic.name)
     runs, finer = list[PreparedExperiment](), list[PreparedExperiment]()
@@ -402,7 +396,7 @@ def _fit_of(problem: TrajectoryProblem, numbers: tuple[FitNumber, ...], report: 
         runs.append(prepare(experiment, values, reach))
         # The error of the integration is nearly proportional to the tolerance, so that finer runs show most of it. It
         # is no independent noise: all samples of a recording share it.
-        finer.append(prepare(experiment, values, reach, 0.5 * runs[-1].run.step, _FINER * FIT_TOLERANCE))
+        finer.append(prepare(experiment, values, reach, 0.5 * runs[-1].run.step))
     report(Progress(f"trajectory fit: {count_of(len(numbers), 'number')}, {count_of(len(runs), 'recording')}"))
     blocks, first = list[ResidualBlock](), 0
     for experiment, run, *both in zip(
@@ -445,11 +439,8 @@ def _result(
     for measured, signals in zip(measurements, signals_of(runs, numbers, fitted.values[:, None]), strict=True):
         modelled = {name: Channel(column[:, 0], measured.unit(name)) for name, column in signals.items()}
         models.append(Recording(f"model of {measured.label}", measured.time, modelled, kind="simulated"))
-    channels, outliers, conflicts = (
-        list[ChannelFit](),
-        list[str](),
-        ["" if fitted.conflict is None else fitted.conflict.words],
-    )
+    channels, outliers = list[ChannelFit](), list[str]()
+    conflicts = [] if fitted.conflict is None else [fitted.conflict.words]
     for number in (number for number in numbers if number.path.startswith(ZERO_OF)):
         # The zero error of a sensor stays within its limit, so a larger drift is due to the model.
         name, limit = number.path.removeprefix(ZERO_OF), math.sqrt(3.0) * number.deviation
