@@ -33,19 +33,13 @@ class _DampedProportionalParameters(NamedTuple):
     dead_band: float
 
 
-class TorqueSlope(NamedTuple):
-    """Torque at the previous sample [N m], filtered torque rate [N m/s], and 1 after the first sample."""
+class _DampedProportionalState(NamedTuple):
+    """Time since the start [s], previous torque [N m], filtered torque rate [N m/s], and 1 after the first sample."""
 
+    elapsed: float = 0.0
     torque: float = 0.0
     slope: float = 0.0
     started: float = 0.0
-
-
-class _DampedProportionalState(NamedTuple):
-    """Time since the start [s], and torque and torque rate at the previous sample."""
-
-    elapsed: float = 0.0
-    course: TorqueSlope = TorqueSlope()
 
 
 def learnt_command(parameters: _DampedProportionalParameters, elapsed: float) -> float:
@@ -58,23 +52,6 @@ def learnt_command(parameters: _DampedProportionalParameters, elapsed: float) ->
     return first + fraction * (parameters.knots[before + 1] - first)
 
 
-def damped_command(
-    gains: DampedGains, course: TorqueSlope, reference: float, torque: float, ahead: float, period: float
-) -> tuple[float, TorqueSlope]:
-    """Command u from -1 to 1 for a reference r and a torque T [N m], added to the command ``ahead`` u_0 [-]:
-
-        u = u_0 + proportional_gain (r - T) - damping dT/dt
-
-    The rate is a backward difference over the period [s] through a filter of first order. Damping acts on the rate of
-    the torque, not of the error, so that a step of the reference gives no kick.
-    """
-    change = (torque - course.torque) * course.started
-    # Implicit, as in the PID: a filter of 0 s is the plain difference.
-    slope = course.slope + (change - period * course.slope) / (period + gains.damping_filter)
-    feedback = gains.proportional_gain * (reference - torque) - gains.damping * slope
-    return max(-1.0, min(1.0, feedback + ahead)), TorqueSlope(torque, slope, 1.0)
-
-
 def damped_update(
     parameters: _DampedProportionalParameters,
     state: _DampedProportionalState,
@@ -84,11 +61,22 @@ def damped_update(
     *,
     parts: ErrorFunctions = OF_TORQUE,
 ) -> tuple[float, _DampedProportionalState]:
-    """Command from -1 to 1: ``damped_command`` plus the learnt command of the table, with dead-band compensation."""
-    ahead = learnt_command(parameters, state.elapsed)
-    wanted, value = parts.steered(reference), parts.steered(seen_value(measurement, parts=parts))
-    opening, course = damped_command(parameters.gains, state.course, wanted, value, ahead, period)
-    return beyond_dead_band(opening, parameters.dead_band), _DampedProportionalState(state.elapsed + period, course)
+    """Command u from -1 to 1 for a reference r and a torque T [N m], with the learnt command u_0 of the table:
+
+        u = u_0 + proportional_gain (r - T) - damping dT/dt
+
+    The rate is a backward difference over the period [s] through a filter of first order. Damping acts on the rate of
+    the torque, not of the error, so that a step of the reference gives no kick. The command compensates the dead band.
+    """
+    gains, ahead = parameters.gains, learnt_command(parameters, state.elapsed)
+    wanted, torque = parts.steered(reference), parts.steered(seen_value(measurement, parts=parts))
+    change = (torque - state.torque) * state.started
+    # Implicit, as in the PID: a filter of 0 s is the plain difference.
+    slope = state.slope + (change - period * state.slope) / (period + gains.damping_filter)
+    feedback = gains.proportional_gain * (wanted - torque) - gains.damping * slope
+    opening = max(-1.0, min(1.0, feedback + ahead))
+    command = beyond_dead_band(opening, parameters.dead_band)
+    return command, _DampedProportionalState(state.elapsed + period, torque, slope, 1.0)
 
 
 DAMPED_PROPORTIONAL = ControllerKind(
