@@ -124,8 +124,7 @@ class Tolerances:
     def gain_of(self, channel: str) -> float:
         """Return the limit of the gain error of a channel [-]; default 0 for an angle sensor."""
         # Of an angle alone a gain is one of all its numbers, which no fit tells from it.
-        usual = 0.0 if channel == "angle" else PRESSURE_ERRORS.gain
-        return usual if self.gain is None else self.gain
+        return (0.0 if channel == "angle" else PRESSURE_ERRORS.gain) if self.gain is None else self.gain
 
     def lag_of(self, channel: str) -> float:
         """Return the limit of the time constant of a sensor and its filter [s]."""

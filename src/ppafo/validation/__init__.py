@@ -3,10 +3,4 @@
 from ppafo.validation.agreement import ChannelAgreement, RecordingAgreement, compare_recording
 from ppafo.validation.settings import ReplaySettings, parse_thresholds
 
-__all__ = [
-    "ChannelAgreement",
-    "RecordingAgreement",
-    "ReplaySettings",
-    "compare_recording",
-    "parse_thresholds",
-]
+__all__ = ["ChannelAgreement", "RecordingAgreement", "ReplaySettings", "compare_recording", "parse_thresholds"]

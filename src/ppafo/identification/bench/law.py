@@ -11,15 +11,7 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.estimate import Identified
-from ppafo.identification.fit import (
-    Fit,
-    FitNumber,
-    ResidualBlock,
-    estimate_of,
-    fit,
-    tolerance,
-    wrong_shape,
-)
+from ppafo.identification.fit import Fit, FitNumber, ResidualBlock, estimate_of, fit, tolerance, wrong_shape
 from ppafo.identification.new_set import stated_half_width
 from ppafo.identification.noise import SAMPLES_PER_COEFFICIENT
 from ppafo.identification.source import Sources, kind_of, remarks_on_readings

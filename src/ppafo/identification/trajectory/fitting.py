@@ -512,20 +512,6 @@ def _result(
     )
 
 
-def candidate_of(
-    label: str, scenario: Scenario, noise: Mapping[str, float], interval: float = 1.0e-3
-) -> FittedExperiment:
-    """Return a candidate for the next experiment: scenario, noise of each channel [rad], [Pa], sample interval [s].
-
-    Without ``noise``, all channels of the fit are compared, each with its estimated noise; otherwise only the channels
-    in ``noise``.
-    """
-    count = math.floor(scenario.run.duration / interval + _FITS)
-    times = interval * np.arange(count + 1, dtype=np.float64)
-    samples = {name: Channel(np.zeros(times.size), CHANNELS[name].unit) for name in FITTED_CHANNELS}
-    return FittedExperiment(label, scenario, Recording(label, times, samples), noise=noise)
-
-
 @dataclass(frozen=True, slots=True)
 class ExpectedBenefit:
     """Expected benefit of a candidate experiment.
@@ -541,10 +527,14 @@ class ExpectedBenefit:
     most_helped: str
 
 
-def expected_information(fit: TrajectoryFit, candidates: Sequence[FittedExperiment]) -> tuple[ExpectedBenefit, ...]:
+def expected_information(
+    fit: TrajectoryFit, candidates: Sequence[tuple[str, Scenario, Mapping[str, float], float]]
+) -> tuple[ExpectedBenefit, ...]:
     """Return the expected benefit of each candidate experiment, the most informative first.
 
-    The whitened Jacobian of a candidate is added to the information of the fit.
+    A candidate is its label, scenario, noise of each compared channel [rad], [Pa], and sample interval [s]; without
+    noise, all channels of the fit are compared, each with its estimated noise. The whitened Jacobian of a candidate is
+    added to the information of the fit.
     """
     benefits, found, sensors = list[ExpectedBenefit](), fit.fit, fit.fit.sensors
     # Another experiment says nothing of a number of one recording, such as its trigger.
@@ -554,17 +544,19 @@ def expected_information(fit: TrajectoryFit, candidates: Sequence[FittedExperime
     # In units of today's standard errors, for pascals and radians differ by many powers of ten.
     errors, rows = np.sqrt(np.diag(found.covariance)), np.ix_(unknowns, unknowns)
     before = found.covariance / np.outer(errors, errors)
-    for candidate in candidates:
-        noise = dict(candidate.noise) or {name: model.deviation for name, model in sensors.items()}
-        start = numbers_in(candidate.label, numbers, point)
-        run = prepare(replace(candidate, noise=noise, channels=tuple(noise)), start, reach_of(numbers))
+    for label, scenario, given, interval in candidates:
+        noise = dict(given) or {name: model.deviation for name, model in sensors.items()}
+        times = interval * np.arange(math.floor(scenario.run.duration / interval + _FITS) + 1, dtype=np.float64)
+        samples = {name: Channel(np.zeros(times.size), CHANNELS[name].unit) for name in noise}
+        candidate = FittedExperiment(label, scenario, Recording(label, times, samples), 0.0, tuple(noise), noise)
+        run = prepare(candidate, numbers_in(label, numbers, point), reach_of(numbers))
 
         def signals(points: Floats, run: PreparedExperiment = run) -> Floats:
             (modelled,) = signals_of([run], numbers, points)
             return np.concatenate([modelled[name] for name in run.measured.names])
 
         runs = FitRuns(signals, numbers, (), report_nothing, 0, is_motion=True)
-        with refused_as(IdentificationError, f"candidate '{candidate.label}'", IdentificationError):
+        with refused_as(IdentificationError, f"candidate '{label}'", IdentificationError):
             # As in the fit, a difference is as long as changes the samples by three units of noise in all.
             deviations = np.repeat(list(noise.values()), len(run.measured))
             runs.adapt_steps(runs.jacobian(point / runs.scale), 1.0 / deviations)
@@ -578,7 +570,7 @@ def expected_information(fit: TrajectoryFit, candidates: Sequence[FittedExperime
         after = np.linalg.inv(information)
         gain = 0.5 * float(np.linalg.slogdet(before[rows])[1] - np.linalg.slogdet(after[rows])[1])
         shrinkage = {found.numbers[index].name: math.sqrt(max(after[index, index], 0.0)) for index in unknowns}
-        benefits.append(ExpectedBenefit(candidate.label, gain, shrinkage, min(shrinkage, key=shrinkage.__getitem__)))
+        benefits.append(ExpectedBenefit(label, gain, shrinkage, min(shrinkage, key=shrinkage.__getitem__)))
     return tuple(sorted(benefits, key=lambda benefit: -benefit.gain))
 
 
@@ -610,7 +602,8 @@ def solve_section(
                 parameters.append(FitNumber(TIME_OFFSET, *bounds, (entry.label,), is_tolerance=True))
         tolerances = tolerance_parameters(context.tolerances, experiments, parameters, context.parameter_set)
         problem = TrajectoryProblem((*parameters, *tolerances), experiments, section.confidence, used)
-        labels, candidates = [experiment.label for experiment in experiments], list[FittedExperiment]()
+        labels = [experiment.label for experiment in experiments]
+        candidates = list[tuple[str, Scenario, Mapping[str, float], float]]()
         if twice := first_twice([*labels, *(one.label for one in section.candidates)]):
             raise IdentificationError(f"candidate '{twice}': another experiment or candidate has this label")
         for one in section.candidates:
@@ -619,7 +612,7 @@ def solve_section(
                 raise IdentificationError(
                     f"candidate '{one.label}': interval = {one.interval:g} s must be at most {longest:g} s"
                 )
-            candidates.append(candidate_of(one.label, scenario, one.noise.by_channel(), one.interval))
+            candidates.append((one.label, scenario, one.noise.by_channel(), one.interval))
         fitted = fit(problem, report)
         expected = expected_information(fitted, candidates)
     except (IdentificationError, DataError) as error:
