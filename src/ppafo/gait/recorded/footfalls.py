@@ -106,7 +106,7 @@ def force_of_plates(
     chosen = []
     for table in tables:
         for name in [column for column in names if column in table.columns]:
-            values, _ = CurveColumns("vertical_force.unit", table, ((1.0, name),), True).in_unit(None, ("N",))
+            values, _ = CurveColumns("vertical_force.unit", table, ((1.0, name),)).in_unit(None, ("N",))
             plate = with_absence(Signal(table.file, table.time, values / (body_mass * STANDARD_GRAVITY)))
             contacts = [(start, end) for start, end in contacts_of(plate) if _is_of_foot(start, end, plate, shank)]
             if contacts:

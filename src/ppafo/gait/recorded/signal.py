@@ -107,7 +107,6 @@ class CurveColumns:
     unit_key: str
     table: MotionTable
     terms: tuple[tuple[float, str], ...]
-    may_be_absent: bool = False
 
     def in_unit(self, stated: str | None, si_units: Sequence[str]) -> tuple[Floats, str]:
         """Return the sum of the terms in the first SI unit that fits, and this unit; raises DataError if none fits."""
@@ -115,7 +114,7 @@ class CurveColumns:
         chosen = si_units[0]
         wrong: list[PpafoError] = []
         for sign, name in self.terms:
-            if not self.may_be_absent:
+            if self.unit_key.partition(".")[0] not in LOADS:
                 with noted_in(wrong):
                     check_recorded(self.table.columns[name], f"{self.table.file}: column {name!r}")
             where, unit = f"{self.table.file}: column {name!r}", stated or self.table.units[name]
@@ -153,7 +152,7 @@ def find_columns(curve: str, mapped: object, tables: Sequence[MotionTable], opti
         raise DataError(f"{curve}: {files} both have the column {unsigned[0]!r}")
     if holders:
         signs = [-1.0 if name.startswith("-") else 1.0 for name in column_names(mapped)]
-        return CurveColumns(f"{curve}.unit", holders[0], tuple(zip(signs, unsigned, strict=True)), curve in LOADS)
+        return CurveColumns(f"{curve}.unit", holders[0], tuple(zip(signs, unsigned, strict=True)))
     if not (optional and not any(name in table.columns for name in unsigned for table in tables)):
         refuse_missing({curve: unsigned}, tables)
     return None
