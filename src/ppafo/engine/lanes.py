@@ -218,40 +218,48 @@ def run_blocks(
             slow = "ppafo: Python runs these models in about %s; compiled models take seconds: %s"
             logger.warning(slow, time_text(seconds), HOW_TO_INSTALL)
 
-    steps, stop = batch.clock.step_count, threading.Event()
+    # One iterator for all threads: a range iterator hands each start to one of them.
+    waiting = iter(starts)
+    stop = threading.Event()
+    ended: list[int] = []
 
-    def run(start: int) -> int:
-        """Run a block to its end, unless another one failed; return the number of runs that have ended."""
-        end = min(start + lanes, runs)
-        members = slice(start, end)
-        parameters, states = batch.parameters[:, members], batch.states[:, members]
-        block = LaneBlock(module, batch.program, batch.clock, parameters, states)
-        for first_step in range(0, steps, STEPS_PER_CALL):
+    def work() -> None:
+        steps = batch.clock.step_count
+        for start in waiting:
+            members = slice(start, min(start + lanes, runs))
+            parameters, states = batch.parameters[:, members], batch.states[:, members]
+            block = LaneBlock(module, batch.program, batch.clock, parameters, states)
+            for first_step in range(0, steps, STEPS_PER_CALL):
+                if stop.is_set():
+                    return
+                # An interrupt is seen between two calls only: compiled code cannot be stopped.
+                interrupts.check()
+                block.advance(min(STEPS_PER_CALL, steps - first_step))
             if stop.is_set():
-                return 0
-            # An interrupt is seen between two calls only: compiled code cannot be stopped.
-            interrupts.check()
-            block.advance(min(STEPS_PER_CALL, steps - first_step))
-        take(members, block.result())
-        return end - start
+                return
+            take(members, block.result())
+            ended.append(members.stop - members.start)
+            if workers == 1:
+                count(ended.pop())
 
-    # One worker needs no pool of threads, and an interrupt reaches it at once.
+    # One block needs no pool of threads, and an interrupt reaches it at once.
     if workers == 1:
-        for start in starts:
-            count(run(start))
+        work()
         return
-    from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+    from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
 
     with ThreadPoolExecutor(workers) as pool:
         try:
-            left = {pool.submit(run, start) for start in starts}
-            while left:
-                done, left = wait(left, _BETWEEN_COUNTS, FIRST_EXCEPTION)
-                # The error of one block is raised at once, and ends the others.
-                count(sum(block.result() for block in done))
+            working = [pool.submit(work) for _ in range(workers)]
+            is_busy = True
+            while is_busy:
+                is_busy = bool(wait(working, _BETWEEN_COUNTS, FIRST_EXCEPTION).not_done)
+                # The error of one worker is raised at once, and ends the others.
+                for worker in filter(Future.done, working):
+                    worker.result()
+                count(sum(ended.pop() for _ in range(len(ended))))
         finally:
             stop.set()
-            pool.shutdown(cancel_futures=True)
 
 
 def join_results(results: Sequence[BatchResult]) -> BatchResult:
