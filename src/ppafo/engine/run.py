@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.groups import Role, filled, rows_of
+from ppafo.engine.groups import Role, filled
 from ppafo.engine.lanes import Batch, BatchResult, Clock, effort_for, load_programs, run_blocks
 from ppafo.engine.program import Program, place_of_group
 from ppafo.engine.rows import of_each, row_numbers
@@ -139,12 +139,9 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     timing = LaneTiming(
         step=run.step, period=run.period, command_lag=command_lag, signal_lag=signal_lag, tolerance=run.tolerance
     )
-    own_groups = program.groups
     declared_at = partial(place_of_group, program)
-    parameters = filled(
-        rows_of(own_groups, Role.PARAMETER), _parameters_of(run, timing), runs, Role.PARAMETER, declared_at
-    )
-    states = filled(rows_of(own_groups, Role.STATE), _states_of(run), runs, Role.STATE, declared_at)
+    parameters = filled(program.parameter_rows(), _parameters_of(run, timing), runs, Role.PARAMETER, declared_at)
+    states = filled(program.state_rows(), _states_of(run), runs, Role.STATE, declared_at)
     numbers = (run.needs_parts, run.step_count, run.steps_per_sample, run.record_every, signal_steps, command_steps)
     counts = np.column_stack([np.full(runs, number, dtype=np.float64) for number in numbers])
     if runs == 1 or (counts == counts[0]).all():

@@ -11,7 +11,7 @@ from ppafo.errors import ScenarioError
 from ppafo.wording import argument_text
 
 if TYPE_CHECKING:
-    from ppafo.simulation.scenario import Scenario
+    pass
 
 MOST_SAMPLES = 50_000
 """Largest number of drawn samples in a comparison."""
@@ -44,27 +44,20 @@ def export_firmware(
     from ppafo.simulation.loading import load_scenario
 
     chosen = load_scenario(scenario, overrides)
-    if try_ or samples is not None:
-        output.check_output(out, COMMAND)
-        answer = _tried(chosen, samples or 1000)
-        if out is not None:
-            output.write_files(out, output.files_of_output(answer), COMMAND)
-        return answer
-    if out is None:
-        raise ScenarioError(f"give {argument_text('out')}, or {argument_text('try_', option='--try')}")
-    return output.export(out, COMMAND, lambda: firmware(chosen), lambda _: f"make -C {shlex.quote(str(out))}")
-
-
-def _tried(scenario: "Scenario", samples: int) -> CommandOutput:
-    """Compare decisions on the simulated processor and in Python."""
+    if not (try_ or samples is not None):
+        if out is None:
+            raise ScenarioError(f"give {argument_text('out')}, or {argument_text('try_', option='--try')}")
+        return output.export(out, COMMAND, lambda: firmware(chosen), lambda _: f"make -C {shlex.quote(str(out))}")
+    output.check_output(out, COMMAND)
     from ppafo.processor.simulated import CLOCK, FLASH, INTERRUPT_STACK, RAM, try_firmware
 
+    samples = samples or 1000
     if samples > MOST_SAMPLES:
         raise ScenarioError(f"{argument_text('samples', str(samples))}: must be 1 to {MOST_SAMPLES}")
-    trial = try_firmware(scenario, samples)
-    share = trial.worst_cycles / CLOCK / scenario.controller.period
+    trial = try_firmware(chosen, samples)
+    share = trial.worst_cycles / CLOCK / chosen.controller.period
     lines = [
-        f"the controller of {scenario.name} on mspdebug, the simulator of an MSP430",
+        f"the controller of {chosen.name} on mspdebug, the simulator of an MSP430",
         "",
         f"flash      {trial.flash} of {FLASH} bytes, the whole program",
         f"RAM        {trial.ram} of {RAM} bytes, data and stack; {INTERRUPT_STACK} more for the timer's interrupt",
@@ -73,6 +66,9 @@ def _tried(scenario: "Scenario", samples: int) -> CommandOutput:
         f"decisions  {samples} drawn samples, {trial.differences} different from the fixed-point controller in Python",
         *([f"the first  {trial.first_difference}"] if trial.differences else []),
     ]
-    document = {"scenario": scenario.name, **trial._asdict()}
+    document = {"scenario": chosen.name, **trial._asdict()}
     exit_code = EXIT_CHECK_FAILED if trial.differences else EXIT_GOOD
-    return CommandOutput("\n".join(lines), document, "processor", exit_code)
+    answer = CommandOutput("\n".join(lines), document, "processor", exit_code)
+    if out is not None:
+        output.write_files(out, output.files_of_output(answer), COMMAND)
+    return answer

@@ -43,16 +43,12 @@ from ppafo.simulation.scenario import Leg, Scenario, vane_motion
 
 FOOT_SETTINGS = ("foot_mass", "foot_mass_centre", "foot_inertia", "shank_length")
 """Settings of a foot on a prescribed shank, in the order of ``foot_load``."""
-OF_ORIFICE = {"valve": "valve", "leak": "actuator.leak"}
-"""Sections of the orifices."""
 OF_SHANK = {"shank.start": "motion.shank.start", "shank.toe_lever": "motion.toe_lever"}
 """Paths of the settings of a shank on a gait, by the path of the number in ``ShankSeries``."""
 LINE_PATHS = tuple(
     f"{SUPPLY_LINE}.{line}.{name}" for line in SUPPLY_LINES for name in ("droop", "largest_flow", "volume")
 )
-"""Settings of the supply lines, in the order of ``SupplyLines``."""
-RELIEVING = "relieving"
-"""Last number of ``SupplyLines``, which is no setting."""
+"""Settings of the supply lines, in the order of ``SupplyLines``, whose last number is no setting."""
 VANE_ONLY_FIELDS = ("torque_constant", "displacement_per_radian")
 """Parameters of the vane without meaning for an actuator of another shape."""
 KNOTS = {"reference": "reference.time_02", "path": "motion.profile.time_02", "shank": "motion.shank.time_02"}
@@ -147,11 +143,12 @@ def set_plant(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
         lane[section] = section_row(parts.class_of_section(section), settings, section)
     lane["supply"] = section_row(parts.class_of_section("supply", "relieving"), settings, "supply", relieving)
     lane.device = parts.row("Device", SEEN_BY_EFFECTS)(*(lane[section] for section in SEEN_BY_EFFECTS))
-    orifices = (("valve", parts.scenario.device.valve.orifice), ("leak", parts.scenario.device.actuator.leak))
-    for name, orifice in orifices:
+    device = parts.scenario.device
+    orifices = (("valve", "valve", device.valve.orifice), ("leak", "actuator.leak", device.actuator.leak))
+    for name, section, orifice in orifices:
         restriction = sonic_restriction if isinstance(orifice, SonicOrifice) else area_restriction
         form: type = type(orifice)
-        given = section_row(parts.row(f"{name}_orifice", names_of(quantities_of(form))), settings, OF_ORIFICE[name])
+        given = section_row(parts.row(f"{name}_orifice", names_of(quantities_of(form))), settings, section)
         lane[f"{name}_restriction"] = restriction(given, lane.gas, settings["flow.linear_ratio"])
     for effect in parts.program.effects:
         if effect.prepare is None:
@@ -277,7 +274,7 @@ def set_gas(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     if parts.scenario.supply_lines is not None:
         relieving = parts.scenario.supply_lines.relieving
         lane.lines = rebuilt(
-            SupplyLines, (relieving if path == RELIEVING else settings[path] for path in (*LINE_PATHS, RELIEVING))
+            SupplyLines, (relieving if path == "relieving" else settings[path] for path in (*LINE_PATHS, "relieving"))
         )
 
 

@@ -7,7 +7,7 @@ name becomes a field, every number is a scalar, and a function over runs is call
 import ast
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -20,7 +20,8 @@ from ppafo.engine.linking import link_program
 from ppafo.engine.loop_text import LOOP_OF_RUN, run_loop
 from ppafo.engine.rows import is_number, is_row, leaf_paths, members, taken
 from ppafo.engine.source_text import SourceCollector, composed_lines
-from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, WHOLE, ExportedProgram, Further
+from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, WHOLE, ExportedProgram
+from ppafo.exports.c_library.library import Library
 from ppafo.metrics.metric import ReadAt, Readings
 from ppafo.model.columns import over_runs
 from ppafo.translation.value_types import FLOAT, INT, Items, Row, RowReference, Type, declared_type
@@ -99,19 +100,10 @@ class _ForOneRun(ast.NodeTransformer):
 _ENDINGS = {WHOLE: "", IN_PARTS: "_in_parts"}
 
 
-def c_text_of_run(
-    exported: ExportedProgram,
-    title: str,
-    name: str,
-    settings: Sequence[str],
-    further: Sequence[Further],
-    around: str,
-    worded: Callable[[str], str],
-) -> str:
+def c_text_of_run(library: Library, title: str, around: str) -> str:
     """Return all functions of an exported program as readable C, for a single run and with structs.
 
-    ``name`` is the prefix of the structs of settings and metrics, which the enclosing file declares. ``further`` may
-    add functions that take ``settings``. ``worded`` puts comments in the words of the actuator and joint.
+    The text ``around`` declares the structs of settings and metrics, with the name of the library as prefix.
     """
     from ppafo.translation.c99 import c_source, documents_of
     from ppafo.translation.c_terms import is_free
@@ -122,17 +114,17 @@ def c_text_of_run(
         INLINE,
         lambda function, tree: ast.fix_missing_locations(_ForOneRun(function.__globals__).visit(tree)),
     )
-    program = exported.program
+    exported, program, name = library.program, library.program.program, library.name
     link_program(program, collector.replacements)
     entries = [metrics_entry(exported, collector)] if exported.metrics else []
-    entries += [add(collector) for add in further]
+    entries += [add(collector) for add in (library.further, library.following, library.checking) if add is not None]
     # Functions that both loops have in common are written once.
     steps = {name: StepText(each, collector, _ENDINGS[name]) for name, each in exported.loops.items()}
     loop = run_loop(steps[WHOLE], f"{name}_outputs", steps.get(IN_PARTS))
     composed = "\n\n".join([HEADER, collector.text(), loop, *entries, ""])
     states = struct_of("run_states", program.state_rows(), collector.add)
     parameters = struct_of("run_parameters", program.parameter_rows(), collector.add)
-    settings_row = struct_of_numbers(f"{name}_settings", settings)
+    settings_row = struct_of_numbers(f"{name}_settings", [setting.name for setting in library.settings])
     outputs = struct_of_numbers(f"{name}_outputs", ["time", *exported.outputs])
     samples = RowReference(Row("run_samples", (("last", outputs.row), ("before", outputs.row))))
     metrics_row = struct_of_numbers(f"{name}_metrics", [kind.name for kind in exported.metrics])
@@ -145,7 +137,7 @@ def c_text_of_run(
         "reach": (parameters, FLOAT, struct_of_numbers("run_reach", ["low", "high"])),
         "check_profiles": (settings_row, struct_of_numbers("run_fault", ["place"])),
     }
-    documents = {name: worded(text) for name, text in (documents_of(collector) | _DOCUMENTS).items()}
+    documents = {name: library.worded(text) for name, text in (documents_of(collector) | _DOCUMENTS).items()}
     # A short name is taken only where it is unambiguous and C leaves it free; all others keep their module's path.
     own = {name: re.sub(r"\W", "_", owner.__qualname__).strip("_") for name, owner in collector.owners.items()}
     # Functions of the step that divide it have their ending beside those that do not.
