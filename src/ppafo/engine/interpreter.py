@@ -15,10 +15,6 @@ from ppafo.engine.step.lane import Lane
 Floats = NDArray[np.float64]
 
 
-Table = tuple[Mapping[str, Any], Floats]
-"""Groups by name, and the array (numbers, runs) of their numbers."""
-
-
 class PythonProgram:
     """Pure-Python program with the interface of a compiled one."""
 
@@ -55,11 +51,14 @@ def _numbers_of(lane: Lane, groups: Iterable[str]) -> list[float]:
 
 
 class PythonLanes:
-    """Runs of a block; during iteration, laws of effects find the rows of the present run in ``now``."""
+    """Runs of a block; during iteration, laws of effects find the rows of the present run in ``now``.
+
+    Each of the ``tables`` has groups by name, and the array (numbers, runs) of their numbers.
+    """
 
     def __init__(
         self,
-        tables: Sequence[Table],
+        tables: Sequence[tuple[Mapping[str, Any], Floats]],
         signal_history: Floats,
         command_history: Floats,
         record: Floats,

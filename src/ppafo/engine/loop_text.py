@@ -65,11 +65,12 @@ class LoopText:
 
     def of_lanes(self, node: ast.expr) -> ast.expr | None:
         """Array or expression of the module for an array or function of ``lanes``; None for any other expression."""
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and _is_lanes(node.func.value):
-            arguments = [ast.unparse(rewritten(argument, self.of_lanes)) for argument in node.args]
-            return parse_expression(self.rows.value(node.func.attr, arguments))
-        if isinstance(node, ast.Attribute) and _is_lanes(node.value):
-            return ast.Name("record" if node.attr == "records" else node.attr, ast.Load())
+        match node:
+            case ast.Call(func=ast.Attribute(value=ast.Name(id="lanes"), attr=method)):
+                arguments = [ast.unparse(rewritten(argument, self.of_lanes)) for argument in node.args]
+                return parse_expression(self.rows.value(method, arguments))
+            case ast.Attribute(value=ast.Name(id="lanes"), attr=name):
+                return ast.Name("record" if name == "records" else name, ast.Load())
         return None
 
     def block(self, statements: Sequence[ast.stmt]) -> list[ast.stmt]:
@@ -150,7 +151,7 @@ class LoopText:
 
     def called(self, node: ast.Call) -> list[ast.stmt]:
         """Statements of a called function of the loop, or of a function of ``lanes``."""
-        if isinstance(node.func, ast.Attribute) and _is_lanes(node.func.value):
+        if isinstance(node.func, ast.Attribute) and ast.unparse(node.func.value) == "lanes":
             arguments = [ast.unparse(self.expression(argument)) for argument in node.args]
             return _parsed(self.rows.action(node.func.attr, arguments))
         function: FunctionType = self.reduction.outside_value(node.func)
@@ -166,11 +167,6 @@ class LoopText:
             # The text for one run has readers.
             begin.append(ast.Expr(ast.Constant((function.__doc__ or "").split("\n")[0])))
         return [*begin, *inner.lines()]
-
-
-def _is_lanes(node: ast.expr) -> bool:
-    """Return whether an expression is the name ``lanes``."""
-    return isinstance(node, ast.Name) and node.id == "lanes"
 
 
 def _parsed(lines: Sequence[str]) -> list[ast.stmt]:

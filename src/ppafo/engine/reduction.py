@@ -78,7 +78,7 @@ class Definition:
 
     tree: ast.FunctionDef
     names: dict[int, frozenset[str]] = field(default_factory=dict)
-    codes: dict[int, tuple[CodeType, bool]] = field(default_factory=dict)
+    codes: dict[int, CodeType] = field(default_factory=dict)
 
     def read_in(self, node: ast.AST) -> frozenset[str]:
         """Return the names that an expression reads, except names that it sets itself."""
@@ -97,12 +97,10 @@ class Definition:
         """Return the value of an expression."""
         if id(node) not in self.codes:
             expression = ast.fix_missing_locations(ast.Expression(node))
-            is_nested = any(isinstance(inner, _COMPREHENSIONS) for inner in ast.walk(node))
-            self.codes[id(node)] = compile(expression, "<parts>", "eval"), is_nested
-        code, is_nested = self.codes[id(node)]
+            self.codes[id(node)] = compile(expression, "<parts>", "eval")
         # The text is that of a function which Python has loaded, with its own globals; no file, setting or argument
         # comes in as text. Before Python 3.12 a comprehension does not see local names: they become globals.
-        return eval(code, {**scope, **known}) if is_nested else eval(code, scope, known)
+        return eval(self.codes[id(node)], {**scope, **known})
 
 
 def names_in(node: ast.AST) -> list[ast.Name]:
@@ -280,13 +278,6 @@ class Reduction:
         if not unknown:
             return ast.Constant(not deciding)
         return unknown[0] if len(unknown) == 1 else ast.BoolOp(node.op, unknown)
-
-    def of_unaryop(self, node: ast.UnaryOp) -> ast.expr:
-        """Return a reduced sign or negation."""
-        inner = self.visit(node.operand)
-        if isinstance(node.op, ast.Not) and isinstance(inner, ast.Constant):
-            return ast.Constant(not inner.value)
-        return ast.UnaryOp(node.op, inner)
 
     def of_attribute(self, node: ast.Attribute) -> ast.expr:
         """Return a reduced attribute access: a group of numbers, or one field of a group."""

@@ -282,11 +282,8 @@ def _shown(
     scale, offset, is_gauge = conversion(unit, "" if si == "1" else si)
     zero = QUANTITIES[quantity].zero if quantity else 0.0
     numbers = {"scale": str(scale), "offset": str(offset), "gauge": is_gauge, "zero": zero}
-    return {"unit": _typeset(unit), "typed": unit, **numbers}
-
-
-def _typeset(text: str) -> str:
-    return functools.reduce(lambda before, word: before.replace(*word), _WORDS.items(), text)
+    typeset = functools.reduce(lambda before, word: before.replace(*word), _WORDS.items(), unit)
+    return {"unit": typeset, "typed": unit, **numbers}
 
 
 def _sentence(summary: str, library: Library) -> str:
