@@ -12,8 +12,8 @@ from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.scheme.pneumatics import flow_rates
 from ppafo.engine.scheme.thermal_gas import WarmGas, thermal_flows
 from ppafo.engine.source_text import SourceCollector, composed_lines
-from ppafo.engine.step.lane import NoParameters
 from ppafo.model.binding import made_of
+from ppafo.model.declaration import EmptyRow
 from ppafo.model.effects.kind import PlantSnapshot
 from ppafo.model.leg import FootLoad
 from ppafo.model.plant import ThermalParameters
@@ -41,7 +41,7 @@ def parameter_groups(program: Program) -> dict[str, type]:
         "plant": program.actuator.plant,
         **({"thermal": ThermalParameters} if program.is_thermal else {}),
         "valve": program.valve.parameters,
-        "path": NoParameters if program.angle is None else program.angle.parameters,
+        "path": EmptyRow if program.angle is None else program.angle.parameters,
         **({} if program.shank is None else {"load": FootLoad, "shank": program.shank.parameters}),
         **{effect.name: effect.parameters for effect in program.effects},
     }

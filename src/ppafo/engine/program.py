@@ -14,12 +14,12 @@ from ppafo.engine.scheme.actuators import functions_of_actuator
 from ppafo.engine.scheme.motion import FreePart, PartEnd, PartSlide, PrescribedStep, StepControl
 from ppafo.engine.scheme.pneumatics import Flows, GasFlows, GasStage, HeldChambers, SlopedFlows
 from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalStage
-from ppafo.engine.step.lane import LaneResult, LaneTiming, NoParameters
+from ppafo.engine.step.lane import LaneResult, LaneTiming
 from ppafo.kinds import kind_at
 from ppafo.model.actuators.kind import ActuatorModel
 from ppafo.model.actuators.vane import MODEL as VANE
 from ppafo.model.controlled import CONTROLLED, TORQUE
-from ppafo.model.declaration import PlainFunction
+from ppafo.model.declaration import EmptyRow, PlainFunction
 from ppafo.model.effects.kind import Effect, State
 from ppafo.model.plant import ActuatorFunctions, PlantState, ThermalParameters, ThermalState
 from ppafo.model.ports import exhaust_path, leakage_path, supply_path
@@ -280,10 +280,10 @@ def groups_of(program: Program) -> Groups:
         "valve_state": kept(program.valve.state),
         "shown": handed(program.valve.shown),
         **({"next_valve": handed(program.valve.state)} if program.is_parted else {}),
-        "controller": given(NoParameters if controller is None else controller.parameters),
-        "controller_state": kept(NoParameters if controller is None else type(controller.initial)),
+        "controller": given(EmptyRow if controller is None else controller.parameters),
+        "controller_state": kept(EmptyRow if controller is None else type(controller.initial)),
         "reference": given(program.reference.parameters),
-        "path": given(NoParameters if program.angle is None else program.angle.parameters),
+        "path": given(EmptyRow if program.angle is None else program.angle.parameters),
         "sensors": given(SensorParameters),
     }
     worn = [part.groups(program) for part in (leg, feed) if part is not None]
@@ -300,7 +300,7 @@ def groups_of(program: Program) -> Groups:
         **{effect.name: given(effect.parameters) for effect in program.effects},
         **{name: kept(row) for name, row in program.effect_states.items()},
         # Groups that only some blocks have come last: their rows are added to those of a run.
-        "course": kept(ReferenceSummary if program.follows_reference else NoParameters),
+        "course": kept(ReferenceSummary if program.follows_reference else EmptyRow),
         **{group: kept(kind.state) for group, kind in program.meter_groups.items()},
     }
 

@@ -15,8 +15,9 @@ from ppafo.engine.rows import of_each, row_numbers
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import StepControl
 from ppafo.engine.scheme.thermal_gas import masses_at_start
-from ppafo.engine.step.lane import MAXIMUM_PARTS, LaneResult, LaneTiming, NoParameters
+from ppafo.engine.step.lane import MAXIMUM_PARTS, LaneResult, LaneTiming
 from ppafo.model.columns import larger, truncated
+from ppafo.model.declaration import EmptyRow
 from ppafo.model.effects.kind import PlantSnapshot
 from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, ThermalParameters
 from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
@@ -85,7 +86,7 @@ class Run:
 
     program: Program
     plant: PlantParameters
-    thermal: ThermalParameters | NoParameters
+    thermal: ThermalParameters | EmptyRow
     initial: PlantState
     valve: Any
     controller: Any
@@ -192,9 +193,9 @@ def _states_of(run: Run) -> dict[str, Any]:
         "result": AT_REST,
         "pace": StepControl(run.step),
         "state": run.initial,
-        "masses": masses_at_start(run.initial) if program.is_thermal else NoParameters(),
+        "masses": masses_at_start(run.initial) if program.is_thermal else EmptyRow(),
         "valve_state": program.valve.state(),
-        "controller_state": NoParameters() if program.controller is None else program.controller.initial,
+        "controller_state": EmptyRow() if program.controller is None else program.controller.initial,
         **({} if run.walk is None else {"walk": run.walk.initial, "gait_seen": NOTHING_SEEN}),
         **({} if run.lines is None else {"line_state": run.lines.initial}),
         **dict(zip(program.effect_states, states_at_start(run), strict=True)),

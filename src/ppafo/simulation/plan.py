@@ -18,12 +18,12 @@ from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import LedLeg, Lines, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE, is_slow
-from ppafo.engine.step.lane import NoParameters
 from ppafo.errors import ScenarioError
 from ppafo.model.binding import made_of
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import Problem, at, choose, first, larger, over_runs, rounded_up, smaller, truncated, whole
 from ppafo.model.controlled import OF_TORQUE, TORQUE, error_functions
+from ppafo.model.declaration import EmptyRow
 from ppafo.model.gas import wall_exchange
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_mass
 from ppafo.model.sensors import SensorParameters
@@ -154,7 +154,7 @@ def compose_run(
     run = Run(
         program=program,
         plant=plant,
-        thermal=NoParameters() if scenario.gas_model is None else thermal_gas(scenario.gas_model, device.gas),
+        thermal=EmptyRow() if scenario.gas_model is None else thermal_gas(scenario.gas_model, device.gas),
         initial=initial_state_of(plant),
         valve=over_runs(lambda *values: valve.prepare(type(settings)(*values)), *settings),
         controller=controller,

@@ -9,9 +9,10 @@ import pytest
 from ppafo.engine.groups import Role, check_rows, filled
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import is_row
-from ppafo.engine.step.lane import Lane, NoParameters
+from ppafo.engine.step.lane import Lane
 from ppafo.errors import ProgramError
 from ppafo.golden_bits import names, plain_batch
+from ppafo.model.declaration import EmptyRow
 from tests.composed_programs import drawn_programs
 
 
@@ -33,7 +34,7 @@ def test_a_group_is_declared_by_one_component_and_is_known_to_a_lane() -> None:
     for program in programs:
         own = {effect.name for effect in program.effects} | program.effect_states.keys() | program.meter_groups.keys()
         for name, group in program.groups.items():
-            if name in own or group.row is NoParameters:
+            if name in own or group.row is EmptyRow:
                 continue
             declared = known[name] if isinstance(known[name], str) else getattr(known[name], "__name__", "Any")
             is_any = declared in ("Any", "typing.Any")

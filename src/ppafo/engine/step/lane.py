@@ -50,10 +50,6 @@ class LaneResult(NamedTuple):
     """1 if the run failed because a step needed more than ``MAXIMUM_PARTS`` parts, else 0."""
 
 
-class NoParameters(NamedTuple):
-    """Placeholder for the parameters of a component that the program does not have."""
-
-
 class Now(NamedTuple):
     """Present step of all runs: step number, controller sample, and end of the present part of the step.
 
