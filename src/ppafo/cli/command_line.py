@@ -270,8 +270,7 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     parameters = inspect.signature(verb).parameters
     values = {name: getattr(parsed, name) for name in parameters if name not in (PROGRESS, PLUGINS)}
     name_plugins(parsed.plugin)
-    for text in _texts(values[parameter] for parameter in _NAMING if parameter in values):
-        name_modules_in(text)
+    name_modules_in(str([values[parameter] for parameter in _NAMING if parameter in values]))
     for parameter, reading in parameters_of(verb):
         if command.lists and values[parameter.name] is None and parameter.default is inspect.Parameter.empty:
             noun = reading.word.metavar.lower()
@@ -287,15 +286,6 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     with output.progress_line() as progress, read_by("command line"):
         answer = verb(**values, **({PROGRESS: progress} if PROGRESS in parameters else {}))
     return output.deliver(answer, parsed.json, folder, name, has_written=OUT in parameters)
-
-
-def _texts(values: Iterable[Any]) -> Iterator[str]:
-    """Yield all texts among values, nested texts included."""
-    for value in values:
-        if isinstance(value, str):
-            yield value
-        elif isinstance(value, Iterable):
-            yield from _texts(value)
 
 
 _BAD_VALUE = re.compile(r"argument (?:--?\w+/)*(\S+): (?!invalid )(.+: .+)")

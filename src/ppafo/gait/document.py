@@ -8,7 +8,6 @@ from typing import Any, get_args
 import numpy as np
 
 from ppafo.arguments import checked
-from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import TomlKind, label, value_text
 from ppafo.errors import DataError, refused_as
 from ppafo.gait.gait import BODY_MASSES, CURVES, REQUIRED, SPEEDS, STATURES, Gait, GaitCurve, Origin, plain_unit
@@ -106,7 +105,7 @@ def parse_gait(content: bytes, file: str) -> Gait:
     """Return the gait in the content of a gait file; ``file`` names it in messages. Raises DataError if invalid."""
     place = label(file)
     document = _FILE.parse(content, place)
-    check_keys(document, declared(document), place, DataError, decoded(content))
+    check_keys(document, declared(document), place, DataError, content)
     numbers = {
         name: quantity.default if (value := value_at(document, path)) is None else number_in(value, quantity)
         for path, (name, quantity) in _NUMBERS.items()

@@ -103,12 +103,11 @@ def read_device(parameter_set: ParameterSet, name: str, links: Graph) -> Device:
         sections[section] = {}
         for quantity in quantities:
             path = f"{section}.{quantity.name}"
-            entry = parameter_set.numbers.get(path)
-            if entry is None and quantity.default is not None:
-                sections[section][quantity.name] = float(quantity.default)
-            elif entry is not None:
+            entry, number = parameter_set.numbers.get(path), quantity.default or 0.0
+            if entry is not None:
                 written = f"{parameter_set.file}: {path} = {entry_text(entry)}"
-                sections[section][quantity.name] = allowed_number(written, entry, declared[path], atmosphere)
+                number = allowed_number(written, entry, declared[path], atmosphere)
+            sections[section][quantity.name] = number
     relieving, has_one_chamber = parameter_set.texts.get(declaration.RELIEVING_PATH), parameter_set.has_one_chamber
     if has_one_chamber:
         # The port of the second chamber is at the atmosphere and passes nothing.

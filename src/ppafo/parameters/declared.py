@@ -14,6 +14,7 @@ from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.faults import line_of, refuse
+from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import NAME, NAME_RULE, SCHEMA, quote
 from ppafo.errors import KindError, PpafoError, UnitError
 from ppafo.model.declaration import Quantity
@@ -337,11 +338,11 @@ def layout_of(fields: Fields, reads_numbers: bool = True) -> FieldLayout:
 
 
 def check_keys(
-    document: Mapping[str, Any], fields: Fields, place: str, error: type[PpafoError], text: str = ""
+    document: Mapping[str, Any], fields: Fields, place: str, error: type[PpafoError], content: bytes
 ) -> None:
-    """Raise ``error`` with all that is wrong in a document; messages start with ``place``."""
+    """Raise ``error`` with what is wrong in a document, by line of its ``content``; messages start with ``place``."""
     if faults := dict(layout_of(fields).faults(document)):
-        refuse(faults, place, error, lambda path: line_of(text, path))
+        refuse(faults, place, error, lambda path: line_of(decoded(content), path))
 
 
 def schema_of(title: str, *declares: Declare) -> dict[str, Any]:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.arguments import Name, Overrides, checked
-from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import NAME, TomlKind, assignments, beside, label, table_lines
 from ppafo.errors import KindError, ParameterError, UnitError, refused_as
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES, find_effects
@@ -134,7 +133,7 @@ def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -
         # So that the messages know every kind of this package.
         for catalogue in (VALVES, ACTUATORS, EFFECTS):
             catalogue.load_own()
-        check_keys(document, declared(document), file, ParameterError, decoded(content))
+        check_keys(document, declared(document), file, ParameterError, content)
     parameter_set = _parameter_set(document, fields, file, folder or Path())
     # Refuses a default valve that the set does not have.
     chosen_valve(parameter_set, None)

@@ -14,7 +14,6 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
-from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import PpafoError
 from ppafo.model.declaration import Quantity
@@ -60,7 +59,7 @@ def checked_record(
 ) -> Record:
     """Return a document as a record. Raises ``refusal`` with all faults, by line of the ``content`` of its file."""
     layout: Any = record
-    check_keys(document, fields_of(layout), file, refusal, decoded(content))
+    check_keys(document, fields_of(layout), file, refusal, content)
     return record_from(record, document)
 
 

@@ -11,7 +11,6 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, refused_as
 from ppafo.model.declaration import Quantity
@@ -111,7 +110,7 @@ def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Pres
     """
     file, content = label(str(name_or_path)), _FILE.read(name_or_path)
     document = _FILE.parse(content, file)
-    check_keys(document, declared(document), file, ParameterError, decoded(content))
+    check_keys(document, declared(document), file, ParameterError, content)
     values = {
         path: float(quantity.default or 0.0)
         if (given := value_at(document, path)) is None

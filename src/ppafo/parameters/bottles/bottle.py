@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
-from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import NAME, TomlKind, label
 from ppafo.errors import ParameterError, PpafoError, UnitError, noted_in, raise_noted, refused_as
 from ppafo.model.cold_gas import ColdSupply, Passage
@@ -260,7 +259,7 @@ def _read(name_or_path: str | Path) -> tuple[dict[str, Any], str]:
     """Read and check a bottle file. Returns its document and the label used in messages."""
     file, content = label(str(name_or_path)), FILE.read(name_or_path)
     document = FILE.parse(content, file)
-    check_keys(document, declared(document), file, ParameterError, decoded(content))
+    check_keys(document, declared(document), file, ParameterError, content)
     return document, file
 
 
