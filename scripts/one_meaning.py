@@ -31,7 +31,7 @@ from ppafo.exports.c_library.exported import COUNTS
 from ppafo.exports.c_library.files import library_files
 from ppafo.loading import load_scenario
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
-from ppafo.parameters.graph import ATMOSPHERE_PATH, counts_from
+from ppafo.parameters.graph import ATMOSPHERE_PATH, fixed_zero
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble.planning import check_columns, plan_ensemble
 from ppafo.simulation.loading import list_scenarios
@@ -222,7 +222,7 @@ def _numbers_in_si(base: Scenario, words: Words) -> dict[str, float]:
     zero = base.device.supply.atmospheric_pressure
     if ATMOSPHERE_PATH in words:
         zero = parse_quantity(words[ATMOSPHERE_PATH], "Pa_a")
-    return {path: parse_quantity(text, declared[path].unit, counts_from(path, zero)) for path, text in words.items()}
+    return {path: parse_quantity(text, declared[path].unit, fixed_zero(path) or zero) for path, text in words.items()}
 
 
 Door = Callable[[str, int, int], Judged]

@@ -170,16 +170,15 @@ def export(
     command: str,
     make: Callable[[], Mapping[str, bytes]],
     next_step: Callable[[Sequence[str]], str],
-    **entries: Any,
 ) -> CommandOutput:
-    """Write the files of an export; the output has their names, the next command, and ``entries``."""
+    """Write the files of an export; the output has their names and the next command."""
     # Before the files are made: a folder that is refused must not cost their making.
     check_output(out, command)
     contents = make()
     write_files(out, contents, command)
     files = list(contents)
     following = next_step(files)
-    document = {"folder": str(out), **entries, "files": files, "next": following}
+    document = {"folder": str(out), "files": files, "next": following}
     return CommandOutput(f"written: {out} ({', '.join(files)}); next: {following}", document)
 
 

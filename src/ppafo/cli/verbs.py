@@ -234,12 +234,9 @@ def export_fmu(
             f"{', '.join(compared)}: outputs compared with Python, to the bit; 'pip install fmpy' gives the command "
             "fmpy, whose 'info' lists the variables"
         )
-    if not_run:
-        lines.append(
-            f"not compared with Python, since they cannot run on this computer: libraries for {', '.join(not_run)}"
-        )
-    elif not compared:
-        lines.append("not compared with Python, since an FMU of sources only cannot run")
+    if not_run or not compared:
+        left = f"libraries for {', '.join(not_run)}" if not_run else "sources alone"
+        lines.append(f"not compared with Python, since they cannot run on this computer: {left}")
     document = {**said.document, "compared": compared, "not_run": not_run}
     return replace(said, text="\n".join(lines), document=document)
 

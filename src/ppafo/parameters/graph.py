@@ -79,18 +79,12 @@ Graph = Mapping[str, tuple[Link, ...]]
 """Links by path of the dependent number; the first link with a changed source acts. Sources come first."""
 
 
-def counts_from(path: str, atmosphere: float) -> float:
-    """Return the zero [Pa absolute] of a gauge pressure at a path.
+def fixed_zero(path: str) -> float | None:
+    """Return the standard atmosphere [Pa] if it is the gauge zero of a path, None for the device's atmosphere.
 
     Pressures of supply, start and reference are relative to the atmosphere of the device. Pressures of controllers and
     sensors are relative to the standard atmosphere, whatever the weather.
     """
-    fixed = fixed_zero(path)
-    return atmosphere if fixed is None else fixed
-
-
-def fixed_zero(path: str) -> float | None:
-    """Return the standard atmosphere [Pa] if it is the gauge zero of a path, None for the device's atmosphere."""
     return None if path.startswith(_COUNTS_FROM_ATMOSPHERE) else STANDARD_ATMOSPHERE
 
 

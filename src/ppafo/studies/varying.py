@@ -12,7 +12,7 @@ from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import fits, is_within, range_rule
 from ppafo.parameters.declared import PLAIN
-from ppafo.parameters.graph import counts_from, gauge_link
+from ppafo.parameters.graph import fixed_zero, gauge_link
 from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si, in_first_unit, unit_in
 from ppafo.simulation.numbers import NOISE_SEED, declared_numbers, number_at
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
@@ -106,7 +106,7 @@ def varied_path(
     if is_gauge and not all(gauge):
         other = units[gauge.index(not gauge[0])]
         raise UnitError(f"the atmosphere varies, so '{units[0]}' and '{other}' cannot be mixed")
-    atmosphere = counts_from(path, scenario.device.supply.atmospheric_pressure)
+    atmosphere = fixed_zero(path) or scenario.device.supply.atmospheric_pressure
     return VariedPath(path, quantity, atmosphere, is_gauge, given if is_plain and fits(given, quantity.unit) else "")
 
 

@@ -137,17 +137,13 @@ def load_fluid(name: str) -> Fluid:
     if name not in available:
         raise ParameterError(f"there is no property table for '{name}'{known_names(name, available)}")
     content = json.loads((_TABLES / f"{name}{_SUFFIX}").read_text(encoding="utf-8"))
-    table = FluidTable(
-        gas_constant=content["gas_constant"],
-        temperatures=tuple(content["temperatures"]),
-        fractions=tuple(content["shares"]),
-        densest=tuple(content["densest"]),
-        liquid_densities=tuple(content.get("liquid_densities", ())),
-        liquid_energies=tuple(content.get("liquid_energies", ())),
-        factors=tuple(map(tuple, content["factors"])),
-        energies=tuple(map(tuple, content["energies"])),
-    )
+    columns = {"fractions": content["shares"], **content}
+    table = FluidTable(*(_fixed(columns.get(name, ())) for name in FluidTable._fields))
     return Fluid(name, table, f"{content['source']}; reference {content['reference']}")
+
+
+def _fixed(value: Any) -> Any:
+    return tuple(map(_fixed, value)) if isinstance(value, list) else value
 
 
 def check_temperature(path: str, temperature: float, fluid: Fluid, file: str) -> None:
@@ -235,10 +231,10 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
 
     ``overrides`` are texts such as ``bottle.gas_mass=567 g`` or ``room.temperature=5 degC``.
     """
-    parsed, file = _read(name_or_path)
+    parsed, stated, file = _read(name_or_path)
     # A file need not state how its regulator and hose warm the gas: they then do so as the paper's.
-    paper = _entries_of(_read(PAPER_BOTTLE)[0])
-    entries = {path: paper[path] for path in WARMING} | _entries_of(parsed)
+    _, paper, _ = _read(PAPER_BOTTLE)
+    entries = {path: paper[path] for path in WARMING} | stated
     changes = override_set(read_overrides(overrides), forms=FILLS)
     for path, override in changes.items():
         if path not in PATHS:
@@ -255,18 +251,13 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     return replace(bottle, title=f"{bottle.title} ({changed})") if changes else bottle
 
 
-def _read(name_or_path: str | Path) -> tuple[dict[str, Any], str]:
-    """Read and check a bottle file. Returns its document and the label used in messages."""
+def _read(name_or_path: str | Path) -> tuple[dict[str, Any], dict[str, Entry], str]:
+    """Read and check a bottle file. Returns its document, its numbers by dotted path, and its label in messages."""
     file, content = label(str(name_or_path)), FILE.read(name_or_path)
     document = FILE.parse(content, file)
     check_keys(document, declared(document), file, ParameterError, content)
-    return document, file
-
-
-def _entries_of(document: Mapping[str, Any]) -> dict[str, Entry]:
-    """Return the numbers given in a bottle file, by dotted path."""
     tables = {path: table for path in PATHS if (table := value_at(document, path)) is not None}
-    return {path: record_from(Entry, table) for path, table in tables.items()}
+    return document, {path: record_from(Entry, table) for path, table in tables.items()}, file
 
 
 def _build(parsed: Mapping[str, Any], entries: Mapping[str, Entry], file: str) -> Bottle:
