@@ -86,18 +86,16 @@ def doctor(
         from ppafo.simulation.simulate import compile_models
 
         compile_models(load_scenario(name) for name in list_scenarios())
-    document = models_document(folder, why_not) | ({"freed": cleared} if clear else {})
-    return CommandOutput(models_text(document, programs), document, "doctor")
+    return _models(folder, why_not, {"freed": cleared} if clear else {}, programs)
 
 
-def models_document(folder: Path | None, why_not: str) -> dict[str, Any]:
-    """Return compilers and cached models of a cache folder; ``why_not`` is the reason not to use the folder, or ""."""
+def _models(folder: Path | None, why_not: str, freed: dict[str, int], one_by_one: bool) -> CommandOutput:
+    """Return compilers and compiled models of a cache folder; ``why_not`` is the reason not to use it, or ""."""
     from ppafo.engine.cache.tidying import LONGEST_UNUSED, MAXIMUM_BYTES, list_left_out, list_programs, list_texts
     from ppafo.engine.loading import compilers_to_try
 
-    programs = [] if folder is None else list_programs(folder)
-    now = time.time()
-    return {
+    programs, now = [] if folder is None else list_programs(folder), time.time()
+    document: dict[str, Any] = {
         "compilers": [compiler.name for compiler in compilers_to_try()],
         "folder": None if folder is None else str(folder),
         "not_used": why_not or None,
@@ -110,11 +108,8 @@ def models_document(folder: Path | None, why_not: str) -> dict[str, Any]:
             {"name": program.path.name, "size": program.size, "unused_days": max(0.0, (now - program.used) / _DAY)}
             for program in programs
         ],
+        **freed,
     }
-
-
-def models_text(document: dict[str, Any], one_by_one: bool) -> str:
-    """Format ``models_document`` as text, with the number of programs, or their list if ``one_by_one``."""
     lines = [f"compilers: {', '.join(document['compilers'])}", f"folder: {document['folder'] or 'none'}"]
     if document["not_used"]:
         lines.append(f"not used: {document['not_used']}")
@@ -130,7 +125,7 @@ def models_text(document: dict[str, Any], one_by_one: bool) -> str:
         lines.append(f"  {item['name']}  {_megabytes(item['size']):>8}  last used {ago}")
     lines += [f"compiler left out for a day: {name}: {why}" for name, why in document["left_out"].items()]
     limits = f"{document['kept_unused_days']:.0f} days unused, or above {_megabytes(document['most_bytes'])} in all"
-    return "\n".join([*lines, f"removed automatically: after {limits}"])
+    return CommandOutput("\n".join([*lines, f"removed automatically: after {limits}"]), document, "doctor")
 
 
 def _megabytes(size: int) -> str:
