@@ -14,7 +14,7 @@ import pytest
 
 from ppafo.analyses.linearise.model import EQUILIBRIUM
 from ppafo.cli import output
-from ppafo.cli.command_line import Command, CommandGroup, option_of, parameters_of
+from ppafo.cli.command_line import Command, CommandGroup, arguments_of
 from ppafo.cli.commands import COMMANDS, OTHERS
 from ppafo.cli.main import build_parser, main
 from ppafo.parameters.publications.publication import PAPER
@@ -31,11 +31,11 @@ VERBS: dict[str, Command] = {
 @pytest.mark.parametrize("name", VERBS)
 def test_every_parameter_of_a_verb_has_its_help_and_every_option_one_meaning(name: str) -> None:
     verb = VERBS[name].function()
-    for parameter, reading in parameters_of(verb):
-        said = re.search(rf"^(?: {{4}})?{parameter.name}: \S", inspect.getdoc(verb) or "", re.MULTILINE)
-        assert said is not None or reading.word.help, parameter.name
-    options = [option_of(parameter, reading) for parameter, reading in parameters_of(verb)]
-    named = [option for option in options if option]
+    arguments = list(arguments_of(verb))
+    for name_of, word in ((argument.parameter.name, argument.word) for argument in arguments):
+        said = re.search(rf"^(?: {{4}})?{name_of}: \S", inspect.getdoc(verb) or "", re.MULTILINE)
+        assert said is not None or word.help, name_of
+    named = [argument.option for argument in arguments if argument.option]
     assert len(set(named)) == len(named)
     parser = build_parser(name.split())
     assert {*named, "--json", "--out"} <= parser.options()

@@ -16,7 +16,7 @@ from importlib.util import find_spec
 from itertools import takewhile
 from pathlib import Path
 from types import CodeType
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn, cast, final
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, NoReturn, cast, final
 
 from ppafo.arguments.reading import Word, number, whole_number
 from ppafo.arguments.values import annotated_parameters
@@ -110,49 +110,43 @@ _PARAMETER = re.compile(r"(\w+): (.*)")
 """Pattern of the first line on a parameter in the docstring of a command function."""
 
 
-@dataclass(frozen=True, slots=True)
-class _OptionType:
-    """Type of a command-line option, from an annotation: conversion of its text to a value."""
+class _Argument(NamedTuple):
+    """Argument of a command: parameter, and by its annotation the conversion of a text to its value.
 
+    ``option`` is the name of the option; empty for a positional argument. Flags are always options.
+    """
+
+    parameter: inspect.Parameter
     word: Word
-    is_flag: bool = False
-    is_repeated: bool = False
-    choices: tuple[str, ...] | None = None
+    option: str
+    is_flag: bool
+    is_repeated: bool
+    choices: tuple[str, ...] | None
+
+    @property
+    def is_required(self) -> bool:
+        """True if the parameter has no default."""
+        return self.parameter.default is inspect.Parameter.empty
 
 
-def reading_of(annotation: Any) -> _OptionType:
-    """Return the option type of an annotation."""
-    word, is_repeated = None, False
-    while True:
-        origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
-        if origin is Annotated:
-            # Python flattens nested annotations with the outermost last: that one has the last word.
-            word = word or next((item for item in reversed(inner) if isinstance(item, Word)), None)
-            annotation = inner[0]
-        elif origin in (typing.Union, types.UnionType):
-            annotation = next(item for item in inner if item is not types.NoneType)
-        elif isinstance(origin, type) and issubclass(origin, Iterable):
-            is_repeated, annotation = True, inner[0]
-        elif origin is typing.Literal:
-            return _OptionType(word or Word("|".join(inner)), choices=inner)
-        else:
-            is_flag = annotation is bool
-            word = word or _PLAIN.get(annotation, Word("TEXT"))
-            return _OptionType(word, is_flag, is_repeated or word.is_repeated)
-
-
-def parameters_of(verb: _Verb) -> Iterator[tuple[inspect.Parameter, _OptionType]]:
-    """Yield each parameter set on the command line, with its option type."""
+def arguments_of(verb: _Verb) -> Iterator[_Argument]:
+    """Yield each argument that is set on the command line."""
     for name, parameter in annotated_parameters(verb).items():
-        if name not in (PROGRESS, PLUGINS):
-            yield parameter, reading_of(parameter.annotation)
-
-
-def option_of(parameter: inspect.Parameter, reading: _OptionType) -> str:
-    """Return the option name of a parameter; empty for a positional parameter. Flags are always options."""
-    if reading.word.option or not (reading.is_flag or parameter.kind is inspect.Parameter.KEYWORD_ONLY):
-        return reading.word.option
-    return f"--{parameter.name.strip('_').replace('_', '-')}"
+        if name in (PROGRESS, PLUGINS):
+            continue
+        word, annotation, is_repeated = None, parameter.annotation, False
+        while (origin := typing.get_origin(annotation)) not in (None, typing.Literal):
+            inner = typing.get_args(annotation)
+            if origin is Annotated:
+                # Python flattens nested annotations with the outermost last: that one has the last word.
+                word = word or next((item for item in reversed(inner) if isinstance(item, Word)), None)
+            is_repeated |= isinstance(origin, type) and issubclass(origin, Iterable)
+            annotation = next(item for item in inner if item is not types.NoneType)
+        choices = typing.get_args(annotation) or None
+        word = word or (Word("|".join(choices)) if choices else _PLAIN.get(annotation, Word("TEXT")))
+        is_option = (is_flag := annotation is bool) or parameter.kind is inspect.Parameter.KEYWORD_ONLY
+        option = word.option or (f"--{name.strip('_').replace('_', '-')}" if is_option else "")
+        yield _Argument(parameter, word, option, is_flag, is_repeated or word.is_repeated, choices)
 
 
 def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing: bool = False) -> None:
@@ -161,14 +155,14 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
     With ``is_listing``, for a command line with ``--list``, none of the parameters is required.
     """
     verb = command.function()
-    readings = list(parameters_of(verb))
-    names = [parameter.name for parameter, _ in readings]
+    arguments = list(arguments_of(verb))
+    names = [argument.parameter.name for argument in arguments]
     helps = _helps_in(inspect.getdoc(verb) or "", names)
     # argparse gives an optional word nothing where options stand between it and a repeated one.
-    is_alone = sum(not option_of(parameter, reading) for parameter, reading in readings) == 1
-    for parameter, reading in readings:
-        help_text = helps.get(parameter.name, reading.word.help)
-        _add_parameter(parser, parameter, reading, help_text, command.lists and is_alone, is_listing)
+    is_alone = sum(not argument.option for argument in arguments) == 1
+    for name, argument in zip(names, arguments, strict=True):
+        help_text = helps.get(name, argument.word.help)
+        _add_argument(parser, argument, help_text, command.lists and is_alone, is_listing)
     if command.lists:
         parser.add_argument("--list", action="store_true", help="list what comes with the package")
     parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
@@ -204,46 +198,40 @@ def _helps_in(docstring: str, names: Collection[str]) -> dict[str, str]:
     return helps
 
 
-def _add_parameter(
-    parser: argparse.ArgumentParser,
-    parameter: inspect.Parameter,
-    reading: _OptionType,
-    help_text: str,
-    may_be_missing: bool,
-    is_listing: bool,
+def _add_argument(
+    parser: argparse.ArgumentParser, argument: _Argument, help_text: str, may_be_missing: bool, is_listing: bool
 ) -> None:
-    """Add a parameter as positional argument or option; ``run`` refuses a missing positional argument."""
-    word, is_required = reading.word, parameter.default is inspect.Parameter.empty
-    default = None if is_required else parameter.default
+    """Add a positional argument or an option; ``run`` refuses a missing positional argument."""
+    name, option, is_required = argument.parameter.name, argument.option, argument.is_required
+    default = None if is_required else argument.parameter.default
     if isinstance(default, float):
         help_text = help_text.replace("{default}", f"{100.0 * default:g}%")
     # argparse formats its help texts with %, so a per cent sign is doubled.
     options: dict[str, Any] = {"help": help_text.replace("%", "%%"), "default": default}
-    option = option_of(parameter, reading)
     if option:
-        options["dest"] = parameter.name
-    if reading.is_flag:
+        options["dest"] = name
+    if argument.is_flag:
         parser.add_argument(option, action="store_true", **options)
         return
 
     def read(text: str) -> Any:
         try:
-            return word.read(text)
+            return argument.word.read(text)
         except ArgumentError as error:
             # argparse prints the message of no error but its own.
             raise argparse.ArgumentTypeError(str(error)) from error
 
-    options |= {"metavar": word.metavar, "type": read, "choices": reading.choices}
+    options |= {"metavar": argument.word.metavar, "type": read, "choices": argument.choices}
     if not option:
-        if reading.is_repeated:
+        if argument.is_repeated:
             options["nargs"] = "+" if is_required and not is_listing else "*"
         # With --list the word may be missing; without it ``run`` refuses that.
         elif not is_required or may_be_missing or is_listing:
             options["nargs"] = "?"
-        parser.add_argument(parameter.name, **options)
+        parser.add_argument(name, **options)
         return
     options["required"] = is_required and not is_listing
-    if reading.is_repeated:
+    if argument.is_repeated:
         # A list, because argparse cannot append to a tuple, which a verb may have as its default.
         options |= {"action": "append", "default": list(default or ())}
     parser.add_argument(option, **options)
@@ -271,9 +259,9 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     values = {name: getattr(parsed, name) for name in parameters if name not in (PROGRESS, PLUGINS)}
     name_plugins(parsed.plugin)
     name_modules_in(str([values[parameter] for parameter in _NAMING if parameter in values]))
-    for parameter, reading in parameters_of(verb):
-        if command.lists and values[parameter.name] is None and parameter.default is inspect.Parameter.empty:
-            noun = reading.word.metavar.lower()
+    for argument in arguments_of(verb):
+        if command.lists and values[argument.parameter.name] is None and argument.is_required:
+            noun = argument.word.metavar.lower()
             raise UsageError(f"no {noun} was given; 'ppafo {name} --list' shows the available names")
     folder = None
     if OUT not in parameters:

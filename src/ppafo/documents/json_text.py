@@ -1,5 +1,6 @@
 """JSON text of plain data, for files and ``--json``, and parsing with a limit on nesting."""
 
+import contextlib
 import dataclasses
 import json
 import math
@@ -57,13 +58,11 @@ def fields_of(value: object, *names: str) -> dict[str, Any]:
 
 def json_document(content: bytes) -> Any:
     """Parse JSON text in UTF-8. Raises ValueError for invalid or too deeply nested text."""
-    try:
+    with contextlib.suppress(RecursionError):
         document = json.loads(content.decode("utf-8"))
-    except RecursionError as error:
-        raise ValueError(f"nested deeper than {MAXIMUM_LEVELS} levels") from error
-    if is_nested_too_deeply(document):
-        raise ValueError(f"nested deeper than {MAXIMUM_LEVELS} levels")
-    return document
+        if not is_nested_too_deeply(document):
+            return document
+    raise ValueError(f"nested deeper than {MAXIMUM_LEVELS} levels")
 
 
 def is_nested_too_deeply(document: Any) -> bool:
