@@ -35,15 +35,7 @@ from ppafo.signals.recording import Floats, Recording
 from ppafo.simulation.numbers import declared_numbers, number_at, other_form, with_numbers
 from ppafo.simulation.recorded.channels import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
 from ppafo.simulation.recorded.rest import samples_at_rest
-from ppafo.simulation.recorded.usual_errors import (
-    ANGLE_ERRORS,
-    PRESSURE_ERRORS,
-    SUPPLY_ERROR,
-    SensorErrors,
-    deviation_of_limit,
-    misread_units,
-    usual_errors,
-)
+from ppafo.simulation.recorded.usual_errors import SUPPLY_ERROR, deviation_of_limit, misread_units, usual_errors
 from ppafo.units.shown import quantity_of_unit, shown_in, shown_unit, shown_value
 from ppafo.validation.agreement import (
     ENGINE_ERROR,
@@ -580,11 +572,11 @@ def of_sensors(agreements: Sequence[RecordingAgreement]) -> Iterator[Cause]:
     groups = {(name,) for name in pressures} | {chambers, supplies, pressures} - {()}
     # Sensors of one kind: their SI unit, the point [SI] about which a gain turns, the size of a zero of 1 [SI], or 0
     # where none is tried, its unit and how many of that are 1 in SI, and the errors of any bench; a command has none.
-    of_pressure = ("Pa", atmosphere, gauge, *_unit_of_pressure(device), PRESSURE_ERRORS)
-    exact = SensorErrors(zero=0.0, gain=0.0, delay=0.0)
+    of_pressure = ("Pa", atmosphere, gauge, *_unit_of_pressure(device), usual_errors(PRESSURE_1))
+    exact = usual_errors(ANGLE)._replace(zero=0.0, gain=0.0)
     sensed = [(group, *of_pressure) for group in sorted(groups, key=lambda group: (-len(group), group))]
     sensed += [
-        ((ANGLE,), "rad", 0.0, 1.0, "deg", math.degrees(1.0), ANGLE_ERRORS),
+        ((ANGLE,), "rad", 0.0, 1.0, "deg", math.degrees(1.0), usual_errors(ANGLE)),
         ((COMMAND,), "", 0.0, 1.0, "of full opening", 1.0, exact),
         ((EXTERNAL_TORQUE,), "N m", 0.0, 0.0, "", 1.0, exact),
     ]

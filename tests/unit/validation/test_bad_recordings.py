@@ -13,9 +13,8 @@ from ppafo.errors import ArgumentError, DataError, PpafoError
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
 from ppafo.signals import Channel, Recording
-from ppafo.validation import parse_thresholds
 from ppafo.validation.measured import check_recording, read_measured
-from ppafo.validation.settings import ErrorLimit, parse_initial
+from ppafo.validation.settings import ErrorLimit, parse_initial, parse_thresholds
 
 Step = tuple[Device, Recording]
 HEADER = "time [s],command [-],angle [deg],pressure_1 [psi_g],pressure_2 [psi_g]"
