@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -18,13 +18,15 @@ from ppafo.units.shown import counted_from, in_units, shown_in
 from ppafo.wording import count_of, percentage
 
 if TYPE_CHECKING:
-    from ppafo.identification.bench.law import BenchResult
+    from ppafo.identification.bench.law import BenchContext, BenchResult
     from ppafo.identification.new_set import NewSet
-    from ppafo.identification.problem import ProblemFile
+    from ppafo.identification.problem import ProblemFile, TrajectorySection
+    from ppafo.identification.source import RecordingReader, UsedRecording
     from ppafo.identification.trajectory.fitting import NuisanceParameter, TrajectoryFit
     from ppafo.parameters.parameter_set import ParameterSet
     from ppafo.report.finding import Finding
     from ppafo.signals import Recording, RecordingKind
+    from ppafo.simulation.scenario import Scenario
 
 _FAR = 2.0
 """Number of standard deviations above which a tolerance counts as contradicted by the recordings."""
@@ -187,7 +189,6 @@ def identify(
     from ppafo.identification.procedures import read_tasks, run_procedure
     from ppafo.identification.source import RecordingReader
     from ppafo.identification.tolerances import DEFAULTS
-    from ppafo.identification.trajectory.fitting import solve_section
     from ppafo.parameters.loading import load_parameter_set
     from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
     from ppafo.parameters.parameter_set import atmospheric_pressure
@@ -214,11 +215,79 @@ def identify(
         if asked.trajectory is not None:
             context = BenchContext(current, device.valve, f"{file}: trajectory", tolerances)
             reader, known = reader._replace(parameter_set=current), {item.path: item for item in estimates}
-            trajectory = solve_section(asked.trajectory, context, reader, known, used, progress)
+            trajectory = _solve_section(asked.trajectory, context, reader, known, used, progress)
             estimates += trajectory.estimates
         new_set = with_estimates(before, estimates, device.valve)
         found = Identification(asked.name, tuple(results), trajectory, before, new_set)
         return finding_of(replace(found, new_set=_described(found, asked)))
+
+
+def _solve_section(
+    section: TrajectorySection,
+    context: BenchContext,
+    reader: RecordingReader,
+    bench: Mapping[str, Estimate],
+    used: tuple[UsedRecording, ...],
+    report: Report,
+) -> TrajectoryFit:
+    """Return the fit of section [trajectory], with the benefit of the candidates, after a check of all inputs.
+
+    Set and valve are those of all scenarios. ``bench`` are estimates of bench procedures by path, ``used`` the
+    recordings from which these were obtained.
+    """
+    from ppafo.errors import DataError, IdentificationError
+    from ppafo.identification.estimate import in_shown_unit
+    from ppafo.identification.fit import FitNumber
+    from ppafo.identification.source import RecordingSource, remarks_on_readings
+    from ppafo.identification.trajectory import experiment as of_motion
+    from ppafo.identification.trajectory.fitting import expected_information, fit
+    from ppafo.parameters.overrides import read_overrides
+    from ppafo.simulation.recorded.usual_errors import deviation_of_limit
+    from ppafo.wording import first_twice
+
+    try:
+        experiments = tuple(of_motion.experiment_of(entry, context, reader) for entry in section.experiments)
+        parameters = [of_motion.parameter_of(entry, experiments, bench) for entry in section.parameters]
+        for entry, experiment in zip(section.experiments, experiments, strict=True):
+            free = {
+                of_motion.full_path(item.path, experiment.scenario) for item in parameters if item.acts_in(entry.label)
+            }
+            for override in read_overrides(entry.overrides):
+                if of_motion.full_path(override.typed, experiment.scenario) in free:
+                    why = f"overrides: {override.typed} is fitted; give its start in [[trajectory.parameters]]"
+                    raise IdentificationError(f"{experiment.where}: {why}")
+            if (limit := entry.time_offset) is not None:
+                # The delay of the samples of one recording is known within a limit, as a tolerance is.
+                bounds = 0.0, -limit, limit, 1.0, deviation_of_limit(limit)
+                parameters.append(FitNumber(of_motion.TIME_OFFSET, *bounds, (entry.label,), is_tolerance=True))
+        tolerances = of_motion.tolerance_parameters(context.tolerances, experiments, parameters, context.parameter_set)
+        problem = of_motion.TrajectoryProblem((*parameters, *tolerances), experiments, section.confidence, used)
+        labels = [experiment.label for experiment in experiments]
+        candidates: list[tuple[str, Scenario, Mapping[str, float], float]] = []
+        if twice := first_twice([*labels, *(one.label for one in section.candidates)]):
+            raise IdentificationError(f"candidate '{twice}': another experiment or candidate has this label")
+        for one in section.candidates:
+            scenario = of_motion.scenario_named(one.scenario, one.overrides, context, reader.folder)
+            if one.interval > (longest := scenario.run.duration):
+                raise IdentificationError(
+                    f"candidate '{one.label}': interval = {one.interval:g} s must be at most {longest:g} s"
+                )
+            candidates.append((one.label, scenario, one.noise.by_channel(), one.interval))
+        fitted = fit(problem, report)
+        expected = expected_information(fitted, candidates)
+    except (IdentificationError, DataError) as error:
+        raise type(error)(f"{context.label}: {error}") from error
+    sources = tuple(RecordingSource(experiment.recording, experiment.source) for experiment in problem.experiments)
+    remarks = [*remarks_on_readings(sources), *fitted.remarks]
+    for item in fitted.estimates:
+        known = bench.get(item.path)
+        if known is None or not (known.is_usable and item.is_usable):
+            continue
+        if item.low > known.high or item.high < known.low:
+            ends = [in_shown_unit(number, item.unit) for number in (item.low, item.high, known.low, known.high)]
+            low, high, lowest, highest = (f"{end:.4g}" for end, _ in ends)
+            remarks.append(f"{item.path}: fitted {low} to {high} {ends[0][1]}, bench procedure {lowest} to {highest}")
+    return replace(fitted, expected=expected, remarks=tuple(remarks))
 
 
 def _described(identification: Identification, problem: ProblemFile) -> NewSet:

@@ -20,14 +20,12 @@ from ppafo.engine.rows import leaves, rebuilt
 from ppafo.engine.run import NEVER_FAILED, Run, batches_of, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.pneumatics import supply_range
-from ppafo.errors import DataError, IdentificationError, refused_as
-from ppafo.identification.bench.law import BenchContext
-from ppafo.identification.estimate import Estimate, Identified, in_shown_unit, shown_text
+from ppafo.errors import IdentificationError, refused_as
+from ppafo.identification.estimate import Identified, shown_text
 from ppafo.identification.fit import Fit, FitNumber, FitRuns, ResidualBlock, estimate_of
 from ppafo.identification.fit import fit as fit_residuals
 from ppafo.identification.noise import Noise, whiten
-from ppafo.identification.problem import TrajectorySection
-from ppafo.identification.source import RecordingReader, RecordingSource, UsedRecording, kind_of, remarks_on_readings
+from ppafo.identification.source import kind_of
 from ppafo.identification.trajectory.experiment import (
     FITTED_CHANNELS,
     GAIN_OF,
@@ -37,25 +35,18 @@ from ppafo.identification.trajectory.experiment import (
     FittedExperiment,
     TrajectoryProblem,
     broken_rule,
-    experiment_of,
-    full_path,
-    parameter_of,
     reach_of,
-    scenario_named,
-    tolerance_parameters,
     with_numbers,
 )
 from ppafo.model.columns import at, over_runs
-from ppafo.parameters.overrides import read_overrides
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.faults import correlated_noise_of, is_at_limit, noise_of, plateaus, resolution_of, rounding_of
 from ppafo.signals.recording import CHANNELS, Channel, Floats, Recording
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, SUPPLY, sample_period
 from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs, with_prescribed_angle
-from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.simulation.scenario import FreeMotion, Scenario
-from ppafo.wording import count_of, first_twice
+from ppafo.wording import count_of
 
 _STATIC, _DYNAMIC = "friction.static_torque", "friction.dynamic_torque"
 _DEAD_TIMES = "delay", "time_offset"
@@ -572,59 +563,3 @@ def expected_information(
         shrinkage = {found.numbers[index].name: math.sqrt(max(after[index, index], 0.0)) for index in unknowns}
         benefits.append(ExpectedBenefit(label, gain, shrinkage, min(shrinkage, key=shrinkage.__getitem__)))
     return tuple(sorted(benefits, key=lambda benefit: -benefit.gain))
-
-
-def solve_section(
-    section: TrajectorySection,
-    context: BenchContext,
-    reader: RecordingReader,
-    bench: Mapping[str, Estimate],
-    used: tuple[UsedRecording, ...],
-    report: Report,
-) -> TrajectoryFit:
-    """Solve section [trajectory]: fit the parameters and rank the candidates, after a check of all inputs.
-
-    Set and valve are those of all scenarios. ``bench`` are estimates of bench procedures by path, ``used`` the
-    recordings from which these were obtained.
-    """
-    try:
-        experiments = tuple(experiment_of(entry, context, reader) for entry in section.experiments)
-        parameters = [parameter_of(entry, experiments, bench) for entry in section.parameters]
-        for entry, experiment in zip(section.experiments, experiments, strict=True):
-            free = {full_path(item.path, experiment.scenario) for item in parameters if item.acts_in(entry.label)}
-            for override in read_overrides(entry.overrides):
-                if full_path(override.typed, experiment.scenario) in free:
-                    why = f"overrides: {override.typed} is fitted; give its start in [[trajectory.parameters]]"
-                    raise IdentificationError(f"{experiment.where}: {why}")
-            if (limit := entry.time_offset) is not None:
-                # The delay of the samples of one recording is known within a limit, as a tolerance is.
-                bounds = 0.0, -limit, limit, 1.0, deviation_of_limit(limit)
-                parameters.append(FitNumber(TIME_OFFSET, *bounds, (entry.label,), is_tolerance=True))
-        tolerances = tolerance_parameters(context.tolerances, experiments, parameters, context.parameter_set)
-        problem = TrajectoryProblem((*parameters, *tolerances), experiments, section.confidence, used)
-        labels = [experiment.label for experiment in experiments]
-        candidates = list[tuple[str, Scenario, Mapping[str, float], float]]()
-        if twice := first_twice([*labels, *(one.label for one in section.candidates)]):
-            raise IdentificationError(f"candidate '{twice}': another experiment or candidate has this label")
-        for one in section.candidates:
-            scenario = scenario_named(one.scenario, one.overrides, context, reader.folder)
-            if one.interval > (longest := scenario.run.duration):
-                raise IdentificationError(
-                    f"candidate '{one.label}': interval = {one.interval:g} s must be at most {longest:g} s"
-                )
-            candidates.append((one.label, scenario, one.noise.by_channel(), one.interval))
-        fitted = fit(problem, report)
-        expected = expected_information(fitted, candidates)
-    except (IdentificationError, DataError) as error:
-        raise type(error)(f"{context.label}: {error}") from error
-    sources = tuple(RecordingSource(experiment.recording, experiment.source) for experiment in problem.experiments)
-    remarks = [*remarks_on_readings(sources), *fitted.remarks]
-    for item in fitted.estimates:
-        known = bench.get(item.path)
-        if known is None or not (known.is_usable and item.is_usable):
-            continue
-        if item.low > known.high or item.high < known.low:
-            ends = [in_shown_unit(number, item.unit) for number in (item.low, item.high, known.low, known.high)]
-            low, high, lowest, highest = (f"{end:.4g}" for end, _ in ends)
-            remarks.append(f"{item.path}: fitted {low} to {high} {ends[0][1]}, bench procedure {lowest} to {highest}")
-    return replace(fitted, expected=expected, remarks=tuple(remarks))
