@@ -13,9 +13,10 @@ from ppafo.control.walking.assistance import PEAKS
 from ppafo.engine.lanes import Floats
 from ppafo.metrics import Metric
 from ppafo.signals import Recording
+from ppafo.simulation.at_hand import RecordedResult, in_own_units
 from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import RecordedResult, Status, in_own_units
+from ppafo.simulation.simulate import Status
 from ppafo.simulation.tracking import Tracking, tracking_in
 from ppafo.simulation.tracking.remedies import level_text
 from ppafo.simulation.tracking.verdict import TOO_SHORT
