@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,8 +20,8 @@ from ppafo.engine.run import Run
 from ppafo.engine.scheme.actuators import pressures_of, volumes_of
 from ppafo.errors import SimulationError
 from ppafo.signals.recording import Recording
+from ppafo.simulation.at_hand import RecordedResult
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import RecordedResult
 from ppafo.units.shown import in_units, units_in_force
 from ppafo.wording import without_exponent
 
@@ -48,21 +48,12 @@ DRAWS = 4
 """Number of noise realisations with which measurements are perturbed if the sensors have no noise."""
 ALLOWED_PARTING = 1.0e-2
 """Largest difference between two runs over time that is ignored, as a fraction of the range."""
-
-
-class _ComparedSignal(NamedTuple):
-    """Channels that are compared over time, their unit, and the promised error divided by their range [-]."""
-
-    channels: tuple[str, ...]
-    unit: str
-    promised_error: float
-
-
 _SIGNALS = {
-    "angle over time": _ComparedSignal(("angle",), "rad", LARGEST_OF_ANGLE),
-    "pressures over time": _ComparedSignal(("pressure_1", "pressure_2"), "Pa", LARGEST_OF_PRESSURE),
-    "temperatures over time": _ComparedSignal(("temperature_1", "temperature_2"), "K", LARGEST_OF_TEMPERATURE),
+    "angle over time": (("angle",), "rad", LARGEST_OF_ANGLE),
+    "pressures over time": (("pressure_1", "pressure_2"), "Pa", LARGEST_OF_PRESSURE),
+    "temperatures over time": (("temperature_1", "temperature_2"), "K", LARGEST_OF_TEMPERATURE),
 }
+"""Channels that are compared over time, their unit, and the promised error divided by their range [-]."""
 
 
 _in_own_units = in_units(lambda estimate: estimate.units)
@@ -246,15 +237,15 @@ def _compared(
     """Metrics and channels of a result with their changes in repeats, by kind, and times [s] at which repeats part."""
     recording, courses, metrics = result.recording, list[NumberCheck](), list[NumberCheck]()
     parted = [repeat.status.time for _, repeat in repeats if repeat.status.time is not None]
-    for name, signal in _SIGNALS.items():
-        channels = [channel for channel in signal.channels if channel in recording]
+    for name, (compared, unit, promised_error) in _SIGNALS.items():
+        channels = [channel for channel in compared if channel in recording]
         if not channels:
             continue
-        extent = _signal_range(result, signal.unit)
-        allowed, promised = ALLOWED_PARTING * extent, signal.promised_error * extent / MARGIN
+        extent = _signal_range(result, unit)
+        allowed, promised = ALLOWED_PARTING * extent, promised_error * extent / MARGIN
         differences = [(kind, _largest_differences(repeat.recording, recording, channels)) for kind, repeat in repeats]
         changes = _largest_changes((kind, float(np.max(each))) for kind, each in differences)
-        courses.append(NumberCheck(name, signal.unit, extent, allowed, changes, promised))
+        courses.append(NumberCheck(name, unit, extent, allowed, changes, promised))
         late = (each > allowed for _, each in differences if np.any(each > allowed))
         parted += [float(recording.time[np.argmax(each)]) for each in late]
     for name, unit in {
@@ -292,7 +283,7 @@ def estimated_error(result: RecordedResult, fine: RecordedResult) -> ErrorEstima
         temperature=errors.get("K"),
         largest=worst,
         share=shares.get(worst, 0.0),
-        over_promise=max(error(row) / (_SIGNALS[row.name].promised_error * row.value) for row in courses),
+        over_promise=max(error(row) / (_SIGNALS[row.name][2] * row.value) for row in courses),
     )
 
 

@@ -94,8 +94,13 @@ def check_parts(scenario: Scenario) -> None:
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declarations of all numbers of a scenario and its device, by path; both forms of each orifice."""
-    device = scenario.device
-    return device_numbers(device) | of_its_chambers(scenario.motion.motion_kind.quantities(scenario), device)
+    device, kind = scenario.device, scenario.device.actuator.kind
+    declared = [(section, quantity) for section in _DEVICE_SECTIONS for quantity in members(section, kind)]
+    declared += [("actuator.leak", quantity) for quantity in ORIFICE]
+    declared += [(effect.section, quantity) for effect in device_effects() for quantity in effect.quantities]
+    declared += [("valve", quantity) for quantity in (*ORIFICE, *VALVES[device.valve.kind].quantities)]
+    of_device = {f"{section}.{quantity.name}": quantity for section, quantity in declared}
+    return of_its_chambers(of_device | scenario.motion.motion_kind.quantities(scenario), device)
 
 
 @in_units(lambda scenario, *_, **__: scenario.device.shown)
@@ -116,16 +121,6 @@ def of_its_chambers(by_path: Mapping[str, _Item], device: Device) -> dict[str, _
     """Return items by path, without items of chamber 2 for an actuator with one chamber."""
     absent = OF_SECOND_CHAMBER if device.actuator.has_one_chamber else frozenset()
     return {path: item for path, item in by_path.items() if path not in absent}
-
-
-def device_numbers(device: Device) -> dict[str, Quantity]:
-    """Return the declarations of all numbers of a device, by path; both forms of each orifice."""
-    kind = device.actuator.kind
-    declared = [(section, quantity) for section in _DEVICE_SECTIONS for quantity in members(section, kind)]
-    declared += [("actuator.leak", quantity) for quantity in ORIFICE]
-    declared += [(effect.section, quantity) for effect in device_effects() for quantity in effect.quantities]
-    declared += [("valve", quantity) for quantity in (*ORIFICE, *VALVES[device.valve.kind].quantities)]
-    return of_its_chambers({f"{section}.{quantity.name}": quantity for section, quantity in declared}, device)
 
 
 def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:

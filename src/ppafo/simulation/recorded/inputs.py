@@ -56,8 +56,17 @@ def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
     A run that follows the angle must come from ``with_prescribed_angle``. Raises DataError for angles far beyond the
     stops.
     """
-    command = _values_at_steps(inputs, COMMAND, run) if COMMAND in inputs.names else None
-    earlier = None if command is None else _earlier_commands(inputs, run)
+    command, earlier, recording = None, None, inputs.recording
+    if COMMAND in inputs.names:
+        command, begin = _values_at_steps(inputs, COMMAND, run), float(recording.time[0])
+        # A recording that begins in motion under a command begins after it, and one at rest begins with it: the vane
+        # cannot have been set in motion at once; a pressure may.
+        first = recording[COMMAND][:1]
+        has_stood = first.any() and motion_at(recording, begin) is not None
+        count = int(min(inputs.start - begin, _HISTORY) / run.step)
+        before = _values_at_steps(inputs, COMMAND, run, -count)[:count]
+        # The first of them has always stood.
+        earlier = np.concatenate([first if has_stood else [0.0], before])
     # The parameters that follow a recording [SI], for every step.
     followed: dict[str, Floats] = {}
     # Later ones prevail: a regulator with a recording of its own does not follow the supply.
@@ -71,28 +80,14 @@ def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
             followed |= dict.fromkeys(paths, _values_at_steps(inputs, channel, run))
     if ANGLE in inputs.names:
         # The straight segment in effect at each step; after the last sample the vane stands still.
-        time = inputs.recording.time - inputs.start
-        angles = between_stops(inputs.recording[ANGLE], device, inputs.recording.label)
+        time = recording.time - inputs.start
+        angles = between_stops(recording[ANGLE], device, recording.label)
         rates = np.append(np.diff(angles) / np.diff(time), 0.0)
         begins = run.step * np.arange(run.step_count, dtype=np.float64)
         # By the middle of a step: rounding may put a sample a little behind the step that begins with it.
         segment = np.maximum(np.searchsorted(time, begins + 0.5 * run.step, side="right") - 1, 0)
         followed |= {"path.start": time[segment], "path.level": angles[segment], "path.rate": rates[segment]}
     return StepInputs(command, followed, earlier)
-
-
-def _earlier_commands(inputs: RecordedInputs, run: Run) -> Floats:
-    """Return the commands of the steps before the start; the first of them has always stood.
-
-    A recording that begins in motion under a command begins after it, and one at rest begins with it.
-    """
-    begin = float(inputs.recording.time[0])
-    count = int(min(inputs.start - begin, _HISTORY) / run.step)
-    earlier = _values_at_steps(inputs, COMMAND, run, -count)[:count]
-    first = inputs.recording[COMMAND][:1]
-    # The vane cannot have been set in motion at once; a pressure may.
-    has_stood = first.any() and motion_at(inputs.recording, begin) is not None
-    return np.concatenate([first if has_stood else [0.0], earlier])
 
 
 def _values_at_steps(inputs: RecordedInputs, name: str, run: Run, first_step: int = 0) -> Floats:

@@ -19,7 +19,7 @@ from ppafo.engine.in_python import over_samples
 from ppafo.engine.recorded_samples import RunningEvaluation, evaluate_samples
 from ppafo.engine.scheme.actuators import torque_of
 from ppafo.metrics.command import requested_samples
-from ppafo.metrics.metric import Floats, Readings, controlled_in, extent, followed, hold_start, reference_of
+from ppafo.metrics.metric import Floats, Readings, controlled_in, extent, followed, hold_start
 from ppafo.metrics.settled import (
     IN_PUSH_OFF,
     LARGEST_SHARE,
@@ -179,11 +179,28 @@ def task_parts(scenario: Scenario, recording: Recording) -> list[SettledPart]:
 
     They are those of a run without recording: its settled meter is fed with the recorded samples.
     """
-    course, time = _course(scenario, recording), recording.time
-    reference, value = followed(recording)
+    (reference, value), time, count = followed(recording), recording.time, len(recording)
+    duration = float(time[-1] - time[0])
+    interval, largest, start = duration / (count - 1), extent(recording), hold_start(recording)
+    profile, choice = PROFILES[scenario.reference.kind], scenario.reference
+    of_one = replace(choice, settings={name: first(setting) for name, setting in choice.settings.items()})
+    period = None if profile.period is None else profile.period(profile_parameters(of_one))
+    # The summary of the reference that a run without recording has at its end.
+    course = ReferenceSummary(
+        last=float(reference[-1]),
+        largest=largest,
+        tolerance=SAME_LEVEL * largest,
+        hold_start=float(count - 1 if start is None else start),
+        samples=float(count),
+        # A value meets a repeated reference in this time.
+        start_up=0.0 if period is None else start_up_of(period, duration, profile.is_wave) / interval,
+        interval=interval,
+        of_joint=0.0 if scenario.controlled == ANGLE else 1.0,
+        previous=float(reference[0]),
+    )
     columns = {"number": np.arange(float(time.size)), "value": value, "reference": reference}
     columns |= {name: recording[name] for name in _OF_RECORDING.channels[3:]}
-    is_cut = float(not PROFILES[scenario.reference.kind].is_wave)
+    is_cut = float(not profile.is_wave)
     sums = evaluate_samples(
         _OF_RECORDING, lambda sample: RecordedSettled(course, start_settled(course, sample), is_cut), columns
     ).sums
@@ -207,29 +224,6 @@ def task_parts(scenario: Scenario, recording: Recording) -> list[SettledPart]:
             )
         )
     return found
-
-
-def _course(scenario: Scenario, recording: Recording) -> ReferenceSummary:
-    """Summary of a recorded reference, as a run without recording has it at its end."""
-    reference, count = reference_of(recording), len(recording)
-    duration = float(recording.time[-1] - recording.time[0])
-    interval = duration / (count - 1)
-    largest, start = extent(recording), hold_start(recording)
-    profile, choice = PROFILES[scenario.reference.kind], scenario.reference
-    single = replace(choice, settings={name: first(setting) for name, setting in choice.settings.items()})
-    period = None if profile.period is None else profile.period(profile_parameters(single))
-    return ReferenceSummary(
-        last=float(reference[-1]),
-        largest=largest,
-        tolerance=SAME_LEVEL * largest,
-        hold_start=float(count - 1 if start is None else start),
-        samples=float(count),
-        # A value meets a repeated reference in this time.
-        start_up=0.0 if period is None else start_up_of(period, duration, profile.is_wave) / interval,
-        interval=interval,
-        of_joint=0.0 if scenario.controlled == ANGLE else 1.0,
-        previous=float(reference[0]),
-    )
 
 
 def settled_parts(scenario: Scenario, metrics: Mapping[str, Floats], least: float) -> list[SettledPart]:

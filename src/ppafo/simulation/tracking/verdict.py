@@ -51,7 +51,7 @@ from ppafo.units.shown import in_units
 from ppafo.wording import override_text, without_exponent
 
 if TYPE_CHECKING:
-    from ppafo.simulation.simulate import RecordedResult
+    from ppafo.simulation.at_hand import RecordedResult
 
 _FEWEST_SAMPLES, _SAMPLES_ADVISED = 8, 100
 """Smallest number of samples of a recording for a verdict, and number of samples that a remedy gives it."""
@@ -80,11 +80,14 @@ class Tracking:
     not follow, else "". ``criterion`` names the ``number`` that decided, with its ``limit``; both are None without it.
     ``said`` is the sentence on a run that follows or is not judged.
 
-    Of a run that does not follow, ``found`` is the failure with the number that decided and its limit, and ``error``
-    the RMS error [SI] of the judged part, which ``when`` says. ``cause`` is the cause, with ``advice``; ``remedies``
-    are the remedies, most promising first; ``others`` are further, less certain causes; ``tried`` is the result of
-    tried remedies, and ``mended`` the overrides with which the run follows. ``accepted`` is the scenario's reason for a
-    torque beyond reach, if that alone keeps the run from its reference, else "".
+    Of a run that does not follow, ``found`` is the failure with the number that decided and its limit. ``error`` is
+    the RMS error of the judged part, ``wanted`` the wanted change, ``missing`` the mean error and ``moved`` the range
+    of the value, all in SI of the ``controlled`` quantity. In the time ``per`` reversals are counted. ``since`` [s] is
+    the start of the judged part, below 0 for a walk, and ``until`` [s] its end, 0 for the end of the run; ``when`` says
+    it. ``cause`` is the cause, with ``advice``; ``remedies`` are the remedies, most promising first; ``others`` are
+    further, less certain causes; ``tried`` is the result of tried remedies, and ``mended`` the overrides with which the
+    run follows. ``accepted`` is the scenario's reason for a torque beyond reach, if that alone keeps the run from its
+    reference, else "".
     """
 
     follows: bool | None
@@ -97,6 +100,12 @@ class Tracking:
     limit: float | None = None
     found: str = ""
     error: float = 0.0
+    wanted: float = 0.0
+    missing: float = 0.0
+    moved: float = 0.0
+    per: str = ""
+    since: float = 0.0
+    until: float = 0.0
     when: str = ""
     cause: str = ""
     advice: str = ""
@@ -164,6 +173,8 @@ def _failing(case: Case, turning: float, rate: float) -> Tracking:
     assert case.failure is not None
     cause, *others = (causes_of_task if case.scenario.follows_reference else causes_of_walk)(case)
     criterion, number, limit, found = _decided(case, turning, rate)
+    settled, walks, settings = case.settled, not case.scenario.follows_reference, case.scenario.controller.settings
+    wanted = settings["largest_torque"] if case.overshoots and walks else settled.wanted_change
     return Tracking(
         follows=False,
         controlled=case.scenario.controlled,
@@ -172,8 +183,14 @@ def _failing(case: Case, turning: float, rate: float) -> Tracking:
         number=number,
         limit=limit,
         found=found,
-        error=case.settled.rms_error,
-        when=_time_text(case.settled),
+        error=settled.rms_error,
+        wanted=wanted if walks else min(wanted, extent(case.recording)),
+        missing=settled.mean_error,
+        moved=settled.peak if case.overshoots else settled.value_range,
+        per="stride" if case.scenario.motion.stride_time else "second",
+        since=settled.start,
+        until=settled.end,
+        when=_time_text(settled),
         cause=cause.text,
         advice=cause.advice,
         remedies=tuple(sorted(cause.remedies, key=rank)),
@@ -246,7 +263,7 @@ def _following(case: Case, _turning: float, _rate: float) -> Tracking:
     scenario, settled, controlled = case.scenario, case.settled, CONTROLLED[case.scenario.controlled]
     criteria = _criteria(case)
     name, number, limit = max(criteria, key=lambda each: each[1] / max(each[2], _LEAST))
-    verdict = Tracking(True, controlled.name, "", "", "", name, number, limit)
+    verdict = Tracking(True, controlled.name, "", "", "", name, number, limit, since=settled.start)
     since = _time_text(settled)
     if settled.is_undecided:
         left = f"with an RMS error of {change_text(controlled.name, settled.rms_error)}{since}"
