@@ -142,7 +142,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
             kind: Kind = load()
         except KindError as error:
             raise KindError(f"{where}: {one_line(error)}") from error
-        except Exception as error:  # what another package does when it is imported is anybody's guess
+        except (Exception, SystemExit) as error:  # what another package does when it is imported is anybody's guess
             raise KindError(f"{where} cannot be loaded: {type(error).__name__}: {one_line(error)}") from error
         if not isinstance(kind, self._kind_type):
             is_a = f"is of type {type(kind).__name__}, not {self._kind_type.__name__}"

@@ -154,7 +154,10 @@ def named_kinds(kind_type: type) -> Iterator[tuple[str, Any]]:
     for plugin in named_plugins():
         try:
             module = _imported(plugin.module, plugin.folder)
-        except Exception:  # a broken module, whatever it raises, is refused where one of its objects is named
+        except (
+            Exception,
+            SystemExit,
+        ):  # a broken module, whatever it raises, is refused where one of its objects is named
             continue
         for key, item in vars(module).items():
             own_name = getattr(item, "name", None) if type(item).__module__.startswith("ppafo.") else None

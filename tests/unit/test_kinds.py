@@ -60,12 +60,12 @@ def test_a_law_of_another_package_is_found_by_its_name_and_only_then(install: In
 
 def test_a_broken_package_is_one_line_and_stops_no_other(install: Install, caplog: pytest.LogCaptureFixture) -> None:
     install("broken_laws", "import nowhere_to_be_found\n", controllers="broken")
-    install("angry_laws", "raise RuntimeError('no\\nno')\n", controllers="angry")
+    install("angry_laws", "raise SystemExit('no\\nno')\n", controllers="angry")
     install("other_laws", LAW.format(name="on_off", call="mine"), controllers="mine")
     with caplog.at_level(logging.WARNING):
         problems = CONTROLLERS.load_all()
     assert problems == (
-        "controller 'angry' of package 'angry_laws' cannot be loaded: RuntimeError: no no",
+        "controller 'angry' of package 'angry_laws' cannot be loaded: SystemExit: no no",
         "controller 'broken' of package 'broken_laws' cannot be loaded: ModuleNotFoundError: No module named "
         "'nowhere_to_be_found'",
     )

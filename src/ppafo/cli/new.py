@@ -143,6 +143,9 @@ def new(
     if os.path.lexists(path):
         raise DataError(f"{path}: already exists; remove it or choose another name")
     load = kind_at(f"{chosen.module}:{chosen.loader}")
+    if source is not None and source.endswith(_SUFFIX):
+        # What is wrong in the file itself is said of it, not of its copy.
+        load(source)
     write_file(path, _content(kind, source, name, path).encode())
     # A copy that does not load, such as one with a path relative to another folder, is not left.
     try:

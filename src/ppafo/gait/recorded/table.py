@@ -135,10 +135,9 @@ def cut_table(
         table = replace(table, time=np.insert(table.time, after, middles), columns=columns)
     inside = (table.time >= low) & (table.time <= high)
     if not inside.any():
-        raise DataError(
-            f"{table.file}: has no samples from {argument_text('start')} {low:g} to {argument_text('end')} {high:g} s, "
-            f"but from {table.time[0]:g} to {table.time[-1]:g} s"
-        )
+        asked = (("start", start), ("end", end))
+        given = " and ".join(argument_text(name, f"{value:g} s") for name, value in asked if value is not None)
+        raise DataError(f"{table.file}: {given}: leaves none of its samples, {table.time[0]:g} to {table.time[-1]:g} s")
     columns = {name: values[inside] for name, values in table.columns.items()}
     return replace(table, time=table.time[inside], columns=columns)
 
