@@ -181,7 +181,7 @@ def test_start_and_end_leave_out_the_rest(tmp_path: Path) -> None:
     part = import_gait([path], ImportSettings(MASS, start=1.2, end=4.5))
     assert (len(whole.strides), len(part.strides)) == (3, 2)
     assert all(item.start >= 1.2 and item.end <= 4.5 for item in part.strides)
-    with pytest.raises(DataError, match="start='7 s': leaves none of its samples, 0 to 5.19 s"):
+    with pytest.raises(DataError, match=r"start='7 s': leaves none of its samples, 0 to 5.19 s"):
         import_gait([path], ImportSettings(MASS, start=7.0))
     with pytest.raises(DataError, match=r"the start, 3 s, must be before the end, 2 s"):
         import_gait([path], ImportSettings(MASS, start=3.0, end=2.0))
