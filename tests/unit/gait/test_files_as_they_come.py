@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.errors import DataError
+from ppafo.errors import ArgumentError, DataError
 from ppafo.gait import Gait, load_gait, walk_recording
 from ppafo.gait.gait import REQUIRED
 from ppafo.gait.plausible import check_force_scale
@@ -173,6 +173,12 @@ def test_rows_that_are_missing_are_bridged_up_to_the_same_length(tmp_path: Path)
     found = import_gait([path], ImportSettings(MASS, longest_gap=0.08))
     assert_true(found.gait, ("shank_angle", "ankle_angle"))
     assert "ik.mot: rows from 1.99 to 2.06 s are missing and were bridged" in found.remarks
+
+
+def test_a_setting_of_another_type_is_refused_with_what_it_must_be() -> None:
+    for setting, said in ({"body_mass": "72.6 kg"}, "a number in SI units"), ({"side": "middle"}, "right or left"):
+        with pytest.raises(ArgumentError, match=f"{next(iter(setting))}: must be {said}, not"):
+            ImportSettings(**setting)  # type: ignore[arg-type]  # as a caller of Python may write
 
 
 def test_start_and_end_leave_out_the_rest(tmp_path: Path) -> None:

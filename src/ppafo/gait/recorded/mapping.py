@@ -8,11 +8,12 @@ import re
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from importlib import resources
+from numbers import Real
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, cast, get_args
 
 from ppafo.documents.toml_text import NAME, TomlKind
-from ppafo.errors import DataError, UnitError, raise_noted, refused_as
+from ppafo.errors import ArgumentError, DataError, UnitError, raise_noted, refused_as
 from ppafo.gait.gait import BODY_MASSES, SPEEDS, STATURES
 from ppafo.gait.recorded.table import LONGEST_FILLED
 from ppafo.parameters.declared import Many, Words
@@ -269,6 +270,19 @@ class ImportSettings:
     ankle_neutral: float | None = None
     form: str = ""
     stride_time: float | None = None
+
+    def __post_init__(self) -> None:
+        """Raise ArgumentError for a setting of another type, such as a text with a unit in place of a number."""
+        for each in fields(self):
+            value, kind, words = getattr(self, each.name), cast("type", Real), "a number in SI units"
+            if isinstance(each.default, str):
+                kind, words = str, "a text"
+            elif each.name == "columns":
+                kind, words = GaitMap, "a GaitMap"
+            if not (isinstance(value, kind) or value is each.default is None):
+                raise ArgumentError(f"{each.name}: must be {words}, not {value!r}")
+        if self.side not in get_args(Side):
+            raise ArgumentError(f"side: must be {' or '.join(get_args(Side))}, not {self.side!r}")
 
 
 _OPTIONS = {"columns": "--map", "least_strides": "--minimum-strides", "longest_gap": "--fill-gaps"}
