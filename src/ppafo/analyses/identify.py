@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import combinations, product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,12 +24,15 @@ if TYPE_CHECKING:
     from ppafo.identification.new_set import NewSet
     from ppafo.identification.problem import ProblemFile, TrajectorySection
     from ppafo.identification.source import RecordingReader, UsedRecording
+    from ppafo.identification.tolerances import Tolerances
     from ppafo.identification.trajectory.fitting import NuisanceParameter, TrajectoryFit
     from ppafo.parameters.parameter_set import ParameterSet
     from ppafo.report.finding import Finding
     from ppafo.signals import Recording, RecordingKind
     from ppafo.simulation.scenario import Scenario
 
+_SIGNIFICANCE = 0.01
+"""Probability by chance [-] below which two procedures contradict each other."""
 _FAR = 2.0
 """Number of standard deviations above which a tolerance counts as contradicted by the recordings."""
 _FAR_FROM_SET = 5.0
@@ -207,10 +212,10 @@ def identify(
         results: list[BenchResult] = []
         for procedure, sources, label in tasks:
             context = BenchContext(current, device.valve, label, tolerances)
-            results.append(run_procedure(sources, procedure, context, results))
+            results.append(run_procedure(sources, procedure, context))
             # Each procedure finds the estimates of earlier ones in the set.
             current = with_estimates(current, results[-1].estimates).parameter_set
-        estimates = [estimate for result in results for estimate in result.estimates]
+        results, estimates = _compared(results, before, tolerances)
         trajectory = None
         if asked.trajectory is not None:
             context = BenchContext(current, device.valve, f"{file}: trajectory", tolerances)
@@ -220,6 +225,55 @@ def identify(
         new_set = with_estimates(before, estimates, device.valve)
         found = Identification(asked.name, tuple(results), trajectory, before, new_set)
         return finding_of(replace(found, new_set=_described(found, asked)))
+
+
+def _compared(
+    results: Sequence[BenchResult], parameter_set: ParameterSet, tolerances: Tolerances
+) -> tuple[list[BenchResult], list[Estimate]]:
+    """Return the results with what two of them say of one number, and the estimates, of such a number the one to use.
+
+    Two values contradict each other where their difference is significant at 1 % over all numbers that two results
+    have. Friction may differ from recording to recording by the tolerance of the bench.
+    """
+    from ppafo.identification.estimate import interval_factor, shown_text
+    from ppafo.simulation.recorded.usual_errors import deviation_of_limit
+
+    told, declared = [*results], parameter_set.declarations()
+    pairs = [
+        (first, second, one, two)
+        for first, second in combinations(range(len(results)), 2)
+        for one, two in product(results[first].estimates, results[second].estimates)
+        if one.path == two.path in declared and one.is_usable and two.is_usable
+    ]
+    said = list[str]()
+    for first, second, one, two in pairs:
+        errors = []
+        for each in (one, two):
+            # A procedure on several recordings has the variation of their friction in its interval.
+            varies = tolerances.friction if "friction." in each.path and len(each.recordings) == 1 else 0.0
+            error = each.wider_half_width / interval_factor(each.confidence)
+            errors.append(math.hypot(error, deviation_of_limit(varies) * each.value))
+        least = interval_factor(1.0 - _SIGNIFICANCE / len(pairs)) * math.hypot(*errors)
+        texts = [shown_text(each.value, each.unit, digits=4) for each in (one, two)]
+        said.append(
+            f"{one.path} is {texts[0]} by {results[first].procedure}, {texts[1]} by {results[second].procedure}"
+        )
+        is_apart = abs(one.value - two.value) > least
+        said[-1] += ", which contradict each other" if is_apart else ", which agree"
+        for number in (first, second) if is_apart else ():
+            # Which of both is wrong no procedure knows.
+            if not told[number].conflict:
+                told[number] = told[number].for_this_model_only(said[-1])
+    used = dict[str, Estimate]()
+    for each in (estimate for result in told for estimate in result.estimates):
+        earlier = used.get(each.path, each)
+        if (each.is_usable, each.is_identified) >= (earlier.is_usable, earlier.is_identified):
+            used[each.path] = each
+    for (_, second, one, _), words in zip(pairs, said, strict=True):
+        if words not in told[second].conflict:
+            taken = shown_text(used[one.path].value, one.unit, digits=4)
+            told[second] = replace(told[second], remarks=(*told[second].remarks, f"{words}: the set takes {taken}"))
+    return told, [each for result in told for each in result.estimates if used[each.path] is each]
 
 
 def _solve_section(
@@ -286,7 +340,8 @@ def _solve_section(
         if item.low > known.high or item.high < known.low:
             ends = [in_shown_unit(number, item.unit) for number in (item.low, item.high, known.low, known.high)]
             low, high, lowest, highest = (f"{end:.4g}" for end, _ in ends)
-            remarks.append(f"{item.path}: fitted {low} to {high} {ends[0][1]}, bench procedure {lowest} to {highest}")
+            fitted_to = f"{low} to {high} {ends[0][1]}".rstrip(" -")
+            remarks.append(f"{item.path}: fitted {fitted_to}, bench procedure {lowest} to {highest}")
     return replace(fitted, expected=expected, remarks=tuple(remarks))
 
 

@@ -17,7 +17,7 @@ from ppafo.identification.bench.law import BenchContext, BenchLaw, BenchResult
 from ppafo.identification.bench.static_torque import FORCE, TORQUE, StaticTorqueProblem
 from ppafo.identification.bench.valve_map import ValveMapProblem
 from ppafo.identification.bench.vane_leak import SteadyLeakProblem, VaneLeakProblem
-from ppafo.identification.estimate import WRONG_UNIT, shown_text
+from ppafo.identification.estimate import WRONG_UNIT
 from ppafo.identification.source import RecordingReader, RecordingSource, UsedRecording, double_use
 from ppafo.parameters.parameter_set import atmospheric_pressure
 from ppafo.signals.recording import CHANNELS, TIME
@@ -180,13 +180,8 @@ def read_tasks(
     return sorted(tasks, key=lambda task: [*LAWS].index(task[0].kind)), tuple(used)
 
 
-def run_procedure(
-    sources: tuple[RecordingSource, ...],
-    problem: BenchProblem,
-    context: BenchContext,
-    earlier: Sequence[BenchResult] = (),
-) -> BenchResult:
-    """Run a bench law on its recordings; a parameter that an ``earlier`` law found otherwise is a conflict.
+def run_procedure(sources: tuple[RecordingSource, ...], problem: BenchProblem, context: BenchContext) -> BenchResult:
+    """Run a bench law on its recordings.
 
     Raises IdentificationError, with the name of the recording or the label of the procedure first.
     """
@@ -208,20 +203,8 @@ def run_procedure(
             raise
         raise IdentificationError(f"{context.label}: {error}") from error
     result = with_tried_units(result, sources, context, lambda again: problem.run(again, context))
-    remarks, declared = [*result.remarks], context.parameter_set.declarations()
+    remarks = [*result.remarks]
     idle = [f"'{name}'" for name in context.tolerances.each_recording if name not in problem.own_errors]
     if idle and len(sources) > 1:
         remarks.append(f"bench.each_recording: {' and '.join(idle)} has no effect in {problem.kind}: one value for all")
-    result = replace(result, summary=f"{result.summary}{gas_used}", remarks=tuple(remarks))
-    for other in earlier:
-        for one in (each for each in other.estimates if each.is_usable and each.path in declared):
-            two = next((each for each in result.estimates if each.path == one.path and each.is_usable), one)
-            if two is one:
-                continue
-            said = " here and ".join(shown_text(each.value, each.unit, digits=3) for each in (two, one))
-            said = f"{one.path} is {said} by {other.procedure}"
-            if abs(one.value - two.value) <= math.hypot(one.wider_half_width, two.wider_half_width):
-                result = replace(result, remarks=(*result.remarks, f"{said}: they agree; the set takes the one here"))
-            elif not result.conflict:
-                result = result.for_this_model_only(f"{said}, which contradict each other")
-    return result
+    return replace(result, summary=f"{result.summary}{gas_used}", remarks=tuple(remarks))

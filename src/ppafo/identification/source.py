@@ -149,6 +149,11 @@ def double_use(uses: Iterable[UsedRecording]) -> str:
     return ""
 
 
+def together(sources: Sources) -> RecordingSource:
+    """Return the first of several recordings with the names of all, for messages on their pooled readings."""
+    return replace(sources[0], reference=", ".join(source.name for source in sources))
+
+
 def pool(sources: tuple[RecordingSource, ...], name: str) -> Floats:
     """Return the values of a channel [SI], concatenated over recordings."""
     return np.concatenate([source.recording[name] for source in sources])

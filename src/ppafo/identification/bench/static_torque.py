@@ -21,7 +21,7 @@ from ppafo.identification.bench import law as bench
 from ppafo.identification.bench import readings
 from ppafo.identification.estimate import in_shown_unit
 from ppafo.identification.fit import Flags
-from ppafo.identification.source import RecordingSource, Sources, pool
+from ppafo.identification.source import RecordingSource, Sources, pool, together
 from ppafo.report.kind import Kind
 from ppafo.report.residuals import curve_mark, with_residuals
 from ppafo.signals.recording import Floats
@@ -97,7 +97,7 @@ class StaticTorqueProblem(bench.BenchLaw):
         # The mean of n samples has the noise of one over sqrt(n).
         weight = np.sqrt(counts / counts.mean())
 
-        slope, zero, friction, scale = _straight_line(sources[0], channel, pressure, load, branch)
+        slope, zero, friction, scale = _straight_line(together(sources), channel, pressure, load, branch)
         # An actuator that slides has kinetic friction. A set has no entry for a force or an area.
         slides = _slides(sources)
         key, grip = ("dynamic", "friction in motion") if slides else ("static", "static friction")
@@ -190,6 +190,7 @@ def _used_readings(sources: Sources, channel: str, zero_of_pressure: float) -> F
                 "pressure rises, -1 while it falls, 0 otherwise"
             )
     pressure, load, direction = (pool(sources, name) for name in (_PRESSURE, channel, "direction"))
+    pooled = together(sources)
     is_used = np.asarray(direction != 0.0)
     readings.check_no_wrong_reading(sources, channel, (pressure, direction), is_used)
     # A scale that only pulls shows nothing until friction is overcome: the rising branch then has a flat start, a
@@ -199,12 +200,12 @@ def _used_readings(sources: Sources, channel: str, zero_of_pressure: float) -> F
     if lowest == 0.0 or (resting.any() and np.ptp(pressure[resting]) > np.ptp(pressure) / _BINS / 2.0):
         is_used &= ~resting
     pressure, direction = pressure[is_used], direction[is_used]
-    readings.check_enough(sources[0], pressure.size, _MINIMUM_SAMPLES, "readings")
+    readings.check_enough(pooled, pressure.size, _MINIMUM_SAMPLES, "readings")
     for sign, name in ((1.0, "rising"), (-1.0, "falling")):
         if not (direction == sign).any():
-            sources[0].refuse(f"the {name} branch is missing: no reading has direction {sign:+.0f}")
+            pooled.refuse(f"the {name} branch is missing: no reading has direction {sign:+.0f}")
     if pressure.max() == pressure.min():
-        readings.check_moves(sources[0], _PRESSURE)
+        readings.check_moves(pooled, _PRESSURE)
     # Two levels fix a line, but do not show whether it is one. Slope, zero and growth of the friction are extrapolated
     # from the spread of the pressures to zero, which the jitter about one commanded pressure does not carry.
     width = max(float(np.ptp(pressure)) / _BINS, _SAME_LEVEL * float(np.abs(pressure).max()), zero_of_pressure)
@@ -216,7 +217,7 @@ def _used_readings(sources: Sources, channel: str, zero_of_pressure: float) -> F
     if levels < _MINIMUM_LEVELS:
         shown, unit = in_shown_unit(width, "Pa_d")
         why = f"{percentage(_SAME_LEVEL, 2)} of the highest" if width > zero_of_pressure else "[bench] zero_of_pressure"
-        sources[0].refuse(
+        pooled.refuse(
             f"needs readings at {_MINIMUM_LEVELS} different pressures or more, not {levels}; pressures closer than "
             f" {shown:.3g} {unit} ({why}) count as one"
         )
