@@ -5,7 +5,7 @@ import math
 import random
 import re
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -14,6 +14,7 @@ from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.rows import leaf_paths, numbers, rebuilt
+from ppafo.errors import KindError
 from ppafo.model.catalog import VALVES
 from ppafo.model.plant import Openings
 from ppafo.model.sensors import Measurement
@@ -146,6 +147,10 @@ def test_valve_models_show_the_reference_solver_openings_between_0_and_1(
 def test_valve_states_survive_the_way_through_rows(name: str, model: ValveModel, settings: Any) -> None:
     state = model.settle(model.prepare(settings), model.state(), 0.6, 0.0)
     assert rebuilt(model.state, map(float, numbers(state))) == state, name
+    with pytest.raises(KindError, match=r"defaults of its state: give those of Bare one: opening"):
+        replace(model, state=NamedTuple("Bare", [("opening", float)]))
+    with pytest.raises(KindError, match=r"annotate its second parameter with the class of the output"):
+        replace(model, connect=lambda _plant, shown: (shown, shown))
 
 
 @pytest.mark.parametrize("kind", VALVES.values(), ids=lambda kind: kind.name)

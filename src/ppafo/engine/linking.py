@@ -20,10 +20,6 @@ def link_program(program: Program, replacements: Replacements) -> None:
 
     Raises ProgramError for an effect that cannot act, or whose name is already used by other rows of the program.
     """
-    if program.valve.shown is None:
-        raise ProgramError(
-            f"{place_of(program.valve.connect)}: the output of the valve must be annotated with its class"
-        )
     for path in (supply_path, exhaust_path):
         closed = path(0.0)
         if closed != 0.0:

@@ -6,8 +6,9 @@ A command is from -1 to 1, as in equation (8); one further value, ``VENT``, stan
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, get_type_hints
+from typing import Any, get_args, get_type_hints
 
+from ppafo.errors import KindError
 from ppafo.model.declaration import PlainFunction, Quantity, quantities_of
 from ppafo.model.orifice import FlowCurve
 from ppafo.model.plant import Openings, PlantParameters, PortFlow, PortSlopes
@@ -60,6 +61,25 @@ class ValveModel:
     settle: Callable[[Any, Any, float, float], Any]
     connect_ahead: Callable[[PlantParameters, Any], tuple[Any, Any]] | None = None
     command_for: Callable[[Any, float, float, float], float] | None = None
+
+    def __post_init__(self) -> None:
+        """Raise KindError for a state without defaults, and for an output whose class is not known, or another."""
+        fields: tuple[str, ...] = getattr(self.state, "_fields", ())
+        without = [name for name in fields if name not in getattr(self.state, "_field_defaults", {})]
+        if without:
+            raise KindError(
+                f"a run begins with the defaults of its state: give those of {self.state.__name__} one: "
+                f"{', '.join(without)}"
+            )
+        shown, (given, *_) = self.shown, (*get_args(get_type_hints(self.advance).get("return")), None)
+        if not (shown is float or hasattr(shown, "_fields")):
+            raise KindError(
+                f"{self.connect.__name__}: annotate its second parameter with the class of the output, float or a "
+                "NamedTuple"
+            )
+        if given not in (shown, Any, None):
+            other = getattr(given, "__name__", given)
+            raise KindError(f"{self.connect.__name__} takes a {shown.__name__}, but advance returns a {other}")
 
     @property
     def regulates(self) -> bool:
