@@ -255,11 +255,9 @@ def _compared(
             errors.append(math.hypot(error, deviation_of_limit(varies) * each.value))
         least = interval_factor(1.0 - _SIGNIFICANCE / len(pairs)) * math.hypot(*errors)
         texts = [shown_text(each.value, each.unit, digits=4) for each in (one, two)]
-        said.append(
-            f"{one.path} is {texts[0]} by {results[first].procedure}, {texts[1]} by {results[second].procedure}"
-        )
+        by = [f"{text} by {results[row].procedure}" for text, row in zip(texts, (first, second), strict=True)]
         is_apart = abs(one.value - two.value) > least
-        said[-1] += ", which contradict each other" if is_apart else ", which agree"
+        said.append(f"{one.path} is {', '.join(by)}, which {'contradict each other' if is_apart else 'agree'}")
         for number in (first, second) if is_apart else ():
             # Which of both is wrong no procedure knows.
             if not told[number].conflict:

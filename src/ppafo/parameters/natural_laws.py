@@ -21,7 +21,7 @@ from ppafo.model.ports import (
     rebound,
     supply_path,
 )
-from ppafo.model.valves.kind import ValveModel
+from ppafo.model.valves.kind import ValveModel, valve_problem
 from ppafo.parameters.device import Device
 from ppafo.parameters.effects import effect_row, effects_of
 from ppafo.parameters.plant import first_settings, plant_parameters
@@ -183,7 +183,11 @@ def broken_laws(device: Device) -> Iterator[str]:
         departures.append((f"actuator '{actuator}'", actuator_departure(ACTUATORS[actuator].model, plant)))
     if not VALVES.is_own(valve):
         settings = first_settings(device.valve)
-        departures.append((f"valve '{valve}'", valve_departure(VALVES[valve].choose(settings), settings, plant)))
+        model = VALVES[valve].choose(settings)
+        if problem := valve_problem(model):
+            yield f"valve '{one_line(valve)}': {problem}"
+            return
+        departures.append((f"valve '{valve}'", valve_departure(model, settings, plant)))
     departures += [
         (f"effect '{effect.name}'", effect_departure(effect, effect_row(effect, device), plant)) for effect in effects
     ]

@@ -68,18 +68,19 @@ def read_measured(
     With ``columns``, a file is read through this column map. Raises DataError if the recording cannot be compared with
     a model.
     """
-    atmosphere = device.supply.atmospheric_pressure
+    # Read for a folder too, which needs none: a name that is wrong is said whatever else is read.
+    atmosphere, mapped = device.supply.atmospheric_pressure, None if columns is None else column_map_of(columns)
     if not isinstance(source, str | Path):
         recording = source if isinstance(source, Recording) else read_recording(source, atmosphere=atmosphere)
         file = recording.label
         content = np.concatenate([recording.time, *(recording[name] for name in sorted(recording.names))]).tobytes()
     else:
         file, place = str(source), Path(source)
-        if columns is None or place.is_dir():
+        if mapped is None or place.is_dir():
             recording = read_recording(place, atmosphere=atmosphere)
         else:
-            (column_map, map_name), gas = column_map_of(columns), f"{device.gas.molar_mass!r} kg/mol"
-            recording = read_foreign(place, column_map, atmosphere=atmosphere, map_name=map_name, gas=gas)
+            (column_map, map_name), gas = mapped, f"{device.gas.molar_mass!r} kg/mol"
+            recording = read_foreign(place, column_map, atmosphere, map_name, gas)
         content = read_bytes(place / NETCDF_FILE if place.is_dir() else place)
     return check_recording(recording, device, file, hashlib.sha256(content).hexdigest())
 

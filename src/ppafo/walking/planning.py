@@ -119,7 +119,7 @@ def stiff_loads(run: Run) -> tuple[Problem, ...]:
             cause = f"drag of {at(damping, number):.3g} N m s/rad at {FASTEST_FOOT:g} rad/s"
         return (
             f"{names}: a {cause} needs steps of at most {1.0e3 * most:.2g} ms, but a walk has fixed steps of "
-            f"{1.0e3 * step:.3g} ms (run.step)"
+            f"{1.0e3 * step:.3g} ms: set run.step = {0.5e3 * most:.2g} ms"
         )
 
     return ((run.step > longest, line),)

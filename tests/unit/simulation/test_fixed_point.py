@@ -26,7 +26,7 @@ class InPython:
 
     def update(self, time: float, reference: float, measurement: Measurement) -> float:
         assert time >= 0.0
-        readings = read(self.fixed.steps, self.fixed.limits, reference, measurement)
+        readings = read(self.fixed.steps, self.fixed.numbers.limits, reference, measurement)
         return self.processor.sample(readings)[0] / 1000
 
 

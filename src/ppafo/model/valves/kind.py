@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, get_args, get_type_hints
 
-from ppafo.errors import KindError
 from ppafo.model.declaration import PlainFunction, Quantity, quantities_of
 from ppafo.model.orifice import FlowCurve
 from ppafo.model.plant import Openings, PlantParameters, PortFlow, PortSlopes
@@ -62,25 +61,6 @@ class ValveModel:
     connect_ahead: Callable[[PlantParameters, Any], tuple[Any, Any]] | None = None
     command_for: Callable[[Any, float, float, float], float] | None = None
 
-    def __post_init__(self) -> None:
-        """Raise KindError for a state without defaults, and for an output whose class is not known, or another."""
-        fields: tuple[str, ...] = getattr(self.state, "_fields", ())
-        without = [name for name in fields if name not in getattr(self.state, "_field_defaults", {})]
-        if without:
-            raise KindError(
-                f"a run begins with the defaults of its state: give those of {self.state.__name__} one: "
-                f"{', '.join(without)}"
-            )
-        shown, (given, *_) = self.shown, (*get_args(get_type_hints(self.advance).get("return")), None)
-        if not (shown is float or hasattr(shown, "_fields")):
-            raise KindError(
-                f"{self.connect.__name__}: annotate its second parameter with the class of the output, float or a "
-                "NamedTuple"
-            )
-        if given not in (shown, Any, None):
-            other = getattr(given, "__name__", given)
-            raise KindError(f"{self.connect.__name__} takes a {shown.__name__}, but advance returns a {other}")
-
     @property
     def regulates(self) -> bool:
         """True for a valve whose command is a set pressure: its openings follow the pressures in the chambers."""
@@ -90,6 +70,22 @@ class ValveModel:
     def shown(self) -> Any:
         """Class of the output, a float or a NamedTuple, as ``connect`` takes it; None if that is not annotated."""
         return get_type_hints(self.connect).get(self.connect.__code__.co_varnames[1])
+
+
+def valve_problem(valve: ValveModel) -> str:
+    """Describe a state without defaults, or an output whose class is not known, or another; empty without a fault."""
+    without = [name for name in valve.state._fields if name not in valve.state._field_defaults]  # type: ignore[attr-defined]
+    if without:
+        return (
+            f"a run begins with the defaults of its state: give those of {valve.state.__name__}: {', '.join(without)}"
+        )
+    shown, connect = valve.shown, valve.connect.__name__
+    if not (shown is float or hasattr(shown, "_fields")):
+        return f"{connect}: annotate its second parameter with the class of the output, float or a NamedTuple"
+    given = (*get_args(get_type_hints(valve.advance).get("return")), None)[0]
+    if given in (shown, Any, None):
+        return ""
+    return f"{connect} takes a {shown.__name__}, but advance returns a {getattr(given, '__name__', given)}"
 
 
 @dataclass(frozen=True, slots=True)
