@@ -846,7 +846,7 @@ def frequency_panels(model: LinearModel) -> list[Panel]:
     def panel(kind: Kind, marks: list[Mark], **scales: Any) -> Panel:
         limits = {"xscale": "log", "xlim": (lowest, 1.1 * highest), **scales}
         frequency, then = Kind("Frequency", "Hz"), methodcaller("set", **limits)
-        return Panel(frequency, kind, marks, legend="inside", then=then, shares_x=True)
+        return Panel(frequency, kind, marks, then=then, shares_x=True)
 
     panels = []
     if margins is not None:
@@ -870,7 +870,7 @@ def frequency_panels(model: LinearModel) -> list[Panel]:
                     marks.append(dots(place, np.interp(place, at, curve), marker, label, colour, markersize=5))
             panels.append(panel(kind, marks, yscale=scale))
     phase = np.degrees(np.unwrap(np.angle(response)))
-    delayed = f"with {1.0e3 * delay:.3g} ms of dead time, late measurements and half a sample"
+    delayed = f"with {1.0e3 * delay:.3g} ms of delays"
     late = Mark("line", frequencies, phase - 360.0 * frequencies * delay, (), delayed, VERMILION, _DASHED)
     shown = (max(-360.0, phase.min() - 90.0), phase.max() + 20.0)
     degrees = np.arange(-360.0, 181.0, 45.0)
