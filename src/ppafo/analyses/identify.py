@@ -230,7 +230,7 @@ def identify(
 def _compared(
     results: Sequence[BenchResult], parameter_set: ParameterSet, tolerances: Tolerances
 ) -> tuple[list[BenchResult], list[Estimate]]:
-    """Return the results with what two of them say of one number, and the estimates, of such a number the one to use.
+    """Return the results with remarks and conflicts on numbers that two of them have, and the estimates to use.
 
     Two values contradict each other where their difference is significant at 1 % over all numbers that two results
     have. Friction may differ from recording to recording by the tolerance of the bench.
@@ -238,14 +238,14 @@ def _compared(
     from ppafo.identification.estimate import interval_factor, shown_text
     from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 
-    told, declared = [*results], parameter_set.declarations()
+    compared, declared = [*results], parameter_set.declarations()
     pairs = [
         (first, second, one, two)
         for first, second in combinations(range(len(results)), 2)
         for one, two in product(results[first].estimates, results[second].estimates)
         if one.path == two.path in declared and one.is_usable and two.is_usable
     ]
-    said = list[str]()
+    sentences = list[str]()
     for first, second, one, two in pairs:
         errors = []
         for each in (one, two):
@@ -257,21 +257,21 @@ def _compared(
         texts = [shown_text(each.value, each.unit, digits=4) for each in (one, two)]
         by = [f"{text} by {results[row].procedure}" for text, row in zip(texts, (first, second), strict=True)]
         is_apart = abs(one.value - two.value) > least
-        said.append(f"{one.path} is {', '.join(by)}, which {'contradict each other' if is_apart else 'agree'}")
+        sentences.append(f"{one.path} is {', '.join(by)}, which {'contradict each other' if is_apart else 'agree'}")
         for number in (first, second) if is_apart else ():
             # Which of both is wrong no procedure knows.
-            if not told[number].conflict:
-                told[number] = told[number].for_this_model_only(said[-1])
+            if not compared[number].conflict:
+                compared[number] = compared[number].for_this_model_only(sentences[-1])
     used = dict[str, Estimate]()
-    for each in (estimate for result in told for estimate in result.estimates):
+    for each in (estimate for result in compared for estimate in result.estimates):
         earlier = used.get(each.path, each)
         if (each.is_usable, each.is_identified) >= (earlier.is_usable, earlier.is_identified):
             used[each.path] = each
-    for (_, second, one, _), words in zip(pairs, said, strict=True):
-        if words not in told[second].conflict:
-            taken = shown_text(used[one.path].value, one.unit, digits=4)
-            told[second] = replace(told[second], remarks=(*told[second].remarks, f"{words}: the set takes {taken}"))
-    return told, [each for result in told for each in result.estimates if used[each.path] is each]
+    for (_, second, one, _), sentence in zip(pairs, sentences, strict=True):
+        if sentence not in compared[second].conflict:
+            remark = f"{sentence}: the set takes {shown_text(used[one.path].value, one.unit, digits=4)}"
+            compared[second] = replace(compared[second], remarks=(*compared[second].remarks, remark))
+    return compared, [each for result in compared for each in result.estimates if used[each.path] is each]
 
 
 def _solve_section(
