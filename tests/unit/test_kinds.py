@@ -8,11 +8,9 @@ from pathlib import Path
 
 import pytest
 
-import ppafo
-from ppafo import plugins
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.errors import KindError, ParameterError, ScenarioError
+from ppafo.errors import ScenarioError
 from ppafo.loading import with_overrides
 from ppafo.metrics import METRICS
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
@@ -87,50 +85,6 @@ def test_a_name_of_one_of_our_own_is_refused_by_name(install: Install) -> None:
         "package"
     )
     assert CONTROLLERS["pid"] is ours
-
-
-@pytest.mark.parametrize(
-    ("text", "problem"),
-    [
-        ("KIND = 1.0\n", "is of type float, not ControllerKind"),
-        (LAW.format(name="on_off", call="another"), "the kind of this entry point is named 'another'"),
-        ("", "cannot be loaded: AttributeError"),
-    ],
-)
-def test_what_is_no_law_of_that_name_is_refused(install: Install, text: str, problem: str) -> None:
-    install("odd_laws", text, controllers="odd")
-    with pytest.raises(KindError, match=problem):
-        CONTROLLERS["odd"]
-
-
-def test_a_law_is_named_by_module_and_object_from_the_working_folder(
-    install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    effect = "from ppafo.model.catalog import EFFECTS\nEFFECT = replace(EFFECTS['joint_load'], name='pull')\n"
-    (tmp_path / "beside.py").write_text(LAW.format(name="on_off", call="anything") + effect)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(plugins, "_named", {})
-    monkeypatch.setenv(plugins.VARIABLE, "")
-    path = list(sys.path)
-    scenario = ppafo.load_scenario("torque-task-proportional", ["controller.kind=beside:KIND"], plugins=["beside"])
-    assert scenario.controller.kind == "beside:KIND"
-    assert sys.path == path
-    # An effect is found by its entry point alone.
-    with pytest.raises(ParameterError, match="no effect 'pull'"):
-        load_scenario("torque-task-proportional", ["effects.pull.drag=1 N m s^2/rad^2"])
-    plugins.name_modules_in("controller.kind=nowhere:KIND")
-    for name, problem in (
-        ("nowhere:KIND", "No module named 'nowhere'"),
-        ("beside:LAW", "has no attribute 'LAW'"),
-        (
-            "json.tool:main",
-            "module 'json.tool' is not loaded, because a file alone must not run code; if you trust the module, add "
-            "--plugin",
-        ),
-        ("math:pi", "is of type float"),
-    ):
-        with pytest.raises(ScenarioError, match=problem):
-            load_scenario("torque-task-proportional", [f"controller.kind={name}"])
 
 
 def test_another_law_forgets_a_number_of_the_same_name_in_another_unit(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -128,11 +128,6 @@ def test_a_mistake_in_a_file_is_one_line_with_what_is_allowed(
     assert "\n" not in str(caught.value)
 
 
-def test_a_claim_that_is_there_twice_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match="'held' appears twice"):
-        load_publication(written(tmp_path, TEXT + TEXT[TEXT.index("[[claims]]") :]))
-
-
 def test_a_study_is_written_as_claims_text_and_page(tmp_path: Path) -> None:
     out = tmp_path / "out"
     document = studied(tmp_path, TEXT).json_document()

@@ -12,8 +12,7 @@ from ppafo.engine.groups import Groups, given, handed
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.program import Program
 from ppafo.engine.run import Run, batch_of
-from ppafo.engine.step import lines, phases
-from ppafo.engine.step.lane import Lane
+from ppafo.engine.step import lines
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library import c_library
 from ppafo.model.declaration import PlainFunction
@@ -21,7 +20,6 @@ from ppafo.model.plant import PlantParameters
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 
-begun = phases.begin_step
 LINES = ("run.duration=20 ms", "supply_line.plantarflexion.droop=3e6 Pa s/kg")
 BACKENDS = pytest.mark.parametrize("backend", ["", "python"])
 
@@ -88,20 +86,3 @@ def test_lines_with_a_parameter_and_a_group_that_is_set_and_read_does_what_it_sa
     records = [run_batch(batch_of(with_lines_of_mine(of_plant))).record for of_plant in (all_of_it, half_of_it)]
     assert np.array_equal(records[0], usual)
     assert not np.array_equal(records[1], usual)
-
-
-def unmade(parts: Program, lane: Lane) -> None:
-    """Ask for a group that is misspelt."""
-    begun(parts, lane)
-    lane.before = lane.befor  # type: ignore[attr-defined]
-
-
-@BACKENDS
-def test_a_group_that_nothing_has_is_refused_with_the_nearest_name(
-    backend: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("PPAFO_BACKEND", backend)
-    monkeypatch.setattr(phases, "begin_step", unmade)
-    said = r"test_edits_of_the_step\.py:\d+: 'lane.befor' is not handed on by an earlier phase .*did you mean 'before'"
-    with pytest.raises(ProgramError, match=said):
-        run_batch(batch_of(plan_run(load_scenario("step-response", ("run.duration=2 ms",)))))

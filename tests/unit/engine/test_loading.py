@@ -15,7 +15,6 @@ from ppafo.engine.cache.folder import LEFT_OUT_FOR
 from ppafo.engine.cache.tidying import list_left_out, list_programs
 from ppafo.engine.compilers import OFFERED
 from ppafo.engine.loading import BACKEND_VARIABLE, compilers_to_try
-from ppafo.errors import ProgramError, SimulationError
 from ppafo.translation import compiling, native
 from tests.interpreted import load_source
 
@@ -205,24 +204,3 @@ def test_a_law_that_has_no_c_is_run_by_python_with_one_line(caplog: pytest.LogCa
     assert [result_of(source), result_of(source)] == [np.sin(2.0)] * 2
     (said,) = caplog.messages
     assert said.endswith("'math.sin' is not supported: Python runs the model, some hundred times slower than compiled")
-
-
-@needs_gcc
-def test_what_a_named_compiler_cannot_compile_is_an_error_that_names_the_other(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setenv(BACKEND_VARIABLE, "gcc")
-    with pytest.raises(
-        ProgramError, match=r"cannot be translated to C: .*; set PPAFO_BACKEND=python to run it in Python"
-    ):
-        load_source(text("math.sin(x[0, 0])"))
-
-
-@on_unix
-def test_a_named_compiler_that_fails_is_an_error_and_no_other_is_taken(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    compiler_that_fails("gcc", tmp_path / "bin", monkeypatch)
-    monkeypatch.setenv(BACKEND_VARIABLE, "gcc")
-    with pytest.raises(SimulationError, match=r"math\.h.*; PPAFO_BACKEND=python needs no compiler"):
-        load_source(text("x[0, 0] - 2.0"))

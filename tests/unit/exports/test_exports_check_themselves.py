@@ -6,11 +6,9 @@ from ppafo.errors import ProgramError
 from ppafo.exports.c_library.files import expected_csv
 from ppafo.exports.fmu import unit
 from ppafo.exports.fmu.interface import closed_loop, plant_alone
-from ppafo.exports.fmu.platforms import host_platform
 from ppafo.exports.fmu.unit import functional_unit
 from ppafo.simulation.loading import load_scenario
 
-pytestmark = pytest.mark.skipif(host_platform() != "linux64", reason="units are run in the tests on linux64 alone")
 SHORT = ("run.duration=0.3 s", "reference.ramp_time=0.1 s")
 
 
@@ -34,9 +32,3 @@ def test_a_unit_with_other_numbers_than_python_is_not_written(
         ProgramError, match=r"at 0\.\d+ s: pressure_1 is \d+\.\d+, Python has 7\.0; no file was written"
     ):
         functional_unit(interface(scenario), fmi, ["linux64"])
-
-
-def test_a_library_that_cannot_be_loaded_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ppafo.exports.fmu.unit.build", lambda *_: b"no library")
-    with pytest.raises(ProgramError, match="the FMU was built but cannot be loaded here"):
-        functional_unit(closed_loop(load_scenario("torque-task-slow-valve", SHORT)), 2, ["linux64"])

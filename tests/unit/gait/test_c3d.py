@@ -1,10 +1,8 @@
 """C3D files: markers and model outputs, through ezc3d."""
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -162,20 +160,6 @@ def test_a_label_of_two_points_refuses_nothing_but_itself(
     content["parameters"]["POINT"]["LABELS"]["value"] = content["parameters"]["POINT"]["LABELS"]["value"][:-1]
     monkeypatch.setattr("ppafo.gait.recorded.forms.c3d.open_c3d", lambda _path: content)
     assert "1 point without a label not read" in read_table(written({"C1": nobody})).remarks
-
-
-def test_what_is_no_c3d_file_is_refused(tmp_path: Path) -> None:
-    pytest.importorskip("ezc3d", reason="the extra c3d is not installed")
-    path = tmp_path / "walk.c3d"
-    path.write_bytes(b"time,angle\n" * 50)
-    with pytest.raises(DataError, match=r"walk.c3d: is not a C3D file"):
-        import_gait([path], ImportSettings(62.0))
-
-
-def test_without_the_library_the_message_says_what_to_install(tmp_path: Path, monkeypatch: Any) -> None:
-    monkeypatch.setitem(sys.modules, "ezc3d", None)
-    with pytest.raises(DataError, match=r"C3D files need ezc3d; install it with 'pip install ppafo\[c3d\]'"):
-        import_gait([tmp_path / "walk.c3d"], ImportSettings(62.0))
 
 
 @pytest.mark.parametrize(

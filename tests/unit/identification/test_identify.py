@@ -3,7 +3,6 @@
 import json
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +27,6 @@ from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage import write_csv
-from ppafo.storage.reading import read_recording
 from ppafo.units import to_si
 from tests.unit.identification import planted
 
@@ -106,14 +104,6 @@ def test_drop_outs_within_a_decay_are_left_out_before_the_push_is_looked_for(ben
     for estimate, right in zip(result.estimates, base, strict=True):
         assert estimate.value == pytest.approx(right.value, rel=0.02)
         assert estimate.verdict == "identified"
-
-
-def test_a_discharge_coefficient_above_one_is_doubted(bench: Path, solved: Solve) -> None:
-    one = planted.flow().recording
-    write_csv(bench / "minutes.csv", one.with_channel("mass_flow", 60.0 * one["mass_flow"], "kg/s"))
-    result = solved(FLOW.replace("flow.csv", "minutes.csv")).results[0]
-    assert result.remarks[0].startswith("Cd = ")
-    assert result.estimates[0].verdict == "holds for this model only"
 
 
 def test_readings_before_the_air_is_on_are_left_out_and_no_swapped_columns(bench: Path, solved: Solve) -> None:
@@ -199,14 +189,6 @@ def test_friction_that_grows_is_written_with_its_growth(solved: Solve) -> None:
     assert outcome.new_set.problem == ""
 
 
-@pytest.mark.parametrize("name", ["decay.csv", "copy.csv"])
-def test_the_same_recording_twice_is_refused_by_the_hash_of_its_numbers(solved: Solve, bench: Path, name: str) -> None:
-    (bench / "copy.csv").write_text("# a copy\n" + (bench / "decay.csv").read_text())
-    for text in (DECAY.replace('"decay.csv"', f'"decay.csv", "{name}"'), DECAY + DECAY.replace("decay.csv", name)):
-        with pytest.raises(PpafoError, match=r"problem\.toml: .* are the same recording"):
-            solved(text)
-
-
 def test_two_procedures_that_find_one_number_agree_or_contradict_each_other(solved: Solve, bench: Path) -> None:
     # Two parts of one recording are not the same samples twice.
     outcome = solved(f'{DECAY}start = "1.1 s"\nend = "3 s"\n{DECAY}start = "3.5 s"\nend = "6 s"\n')
@@ -217,16 +199,6 @@ def test_two_procedures_that_find_one_number_agree_or_contradict_each_other(solv
     for result in outcome.results:
         assert "by static-torque, which contradict each other" in result.conflict
     assert not outcome.is_good
-
-
-def test_a_set_says_from_which_recordings_and_on_which_set_it_was_made(solved: Solve, bench: Path) -> None:
-    made = solved(STATIC).new_set.parameter_set
-    before = load_parameter_set("ppafo2011").title
-    assert made.title == f"{before}, identified on ppafo2011 from 1 recording"
-    assert "come from the problem 'twin', on the set 'ppafo2011' from synthetic recordings: static.csv; " in made.notes
-    text = (bench / "static.csv").read_text()
-    (bench / "static.csv").write_text("".join(line for line in text.splitlines(True) if line[0] != "#"))
-    assert "from measured recordings: static.csv; " in solved(STATIC).new_set.parameter_set.notes
 
 
 def test_the_citation_of_a_problem_is_that_of_the_new_set(solved: Solve) -> None:
@@ -316,15 +288,6 @@ def test_what_a_column_map_has_wrong_and_what_it_lacks_are_one_refusal(bench: Pa
         assert "needs a channel 'downstream_pressure [Pa]', absolute downstream pressure; channels read: " in str(
             refused.value
         )
-
-
-def test_a_refusal_about_all_recordings_names_the_procedure_of_the_file(solved: Solve, bench: Path) -> None:
-    leak = read_recording(bench / "leak.csv", atmosphere=101325.0)
-    first, second = (leak.channels[name] for name in ("pressure_1", "pressure_2"))
-    write_csv(bench / "turned.csv", replace(leak, channels={"pressure_1": second, "pressure_2": first}))
-    both = LEAK.replace('["leak.csv"]', '["leak.csv", "turned.csv"]')
-    with pytest.raises(PpafoError, match=r"^problem\.toml: procedure 1, vane-leak: chamber 1 empties in some"):
-        solved(both)
 
 
 def test_the_leak_of_a_cylinder_is_identified_as_that_of_a_vane(bench: Path) -> None:
@@ -508,15 +471,3 @@ def test_a_set_states_the_half_width_for_its_own_confidence() -> None:
     # With three digits, as many as the value then has behind its point.
     assert entry.uncertainty == round(0.1 * entry.value * 1.959964 / 2.575829, 3)
     assert "99% interval" in entry.note
-
-
-def test_a_tolerance_that_is_anew_in_each_recording_but_common_in_a_procedure_is_said(
-    solved: Solve, bench: Path
-) -> None:
-    write_csv(bench / "again.csv", planted.flow(seed=5).recording)
-    two = FLOW.replace('["flow.csv"]', '["flow.csv", "again.csv"]')
-
-    remarks = solved(f"bench.each_recording = ['gain']\n{two}").results[0].remarks
-
-    assert any("bench.each_recording: 'gain' has no effect in" in one for one in remarks)
-    assert solved(two).results[0].remarks == ()

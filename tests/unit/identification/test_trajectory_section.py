@@ -12,7 +12,6 @@ import pytest
 from ppafo.analyses.identify import Identification, finding_of, identify
 from ppafo.cli.main import main
 from ppafo.errors import PpafoError
-from ppafo.identification.source import UsedRecording, double_use
 from ppafo.parameters.device import Orifice
 from ppafo.parameters.loading import load_device, parameter_set_toml, parse_parameter_set
 from ppafo.report.finding import text_of
@@ -432,22 +431,6 @@ def test_a_held_vane_is_fitted_in_its_pressures(solve: Solve, laboratory: Path) 
     assert [channel.channel for channel in outcome.trajectory.channels] == ["pressure_1", "pressure_2"]
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (f"{TANK}locked = '75 deg'\n", "locked and volume exclude each other: a fixed volume has no vane"),
-        (TANK.replace("60 cm^3", "0 cm^3"), "volume = '0 cm^3': must be more than 0 cm^3"),
-        (TANK.replace("60 cm^3", "60 psi"), "volume"),
-        (f"{TANK}inputs = ['command', 'angle']\n", "'angle' cannot be an input with locked or volume"),
-        (f"{TANK}scenario = 'step-response'\n", "volume cannot be combined with a scenario"),
-    ],
-)
-def test_a_contradiction_about_the_vane_is_told(solve: Solve, laboratory: Path, text: str, message: str) -> None:
-    tank(laboratory, 0.3)
-    with pytest.raises(PpafoError, match=re.escape(message)):
-        solve(f"{ONE_NUMBER}{text}")
-
-
 @pytest.mark.parametrize("prior", ['prior = "bench"', 'start = "0.025 N m s/rad"'])
 @pytest.mark.parametrize("name", ["decay.csv", "copied.csv"])
 def test_a_recording_of_a_bench_procedure_that_is_fitted_too_is_refused(
@@ -461,17 +444,3 @@ def test_a_recording_of_a_bench_procedure_that_is_fitted_too_is_refused(
     told = rf"free-decay \(decay\.csv sha256:.*'step' \({name} sha256:.*are the same recording.*would count twice"
     with pytest.raises(PpafoError, match=told):
         solve(f"{DECAY}{text}")
-
-
-def test_other_times_of_a_recording_of_a_bench_procedure_may_be_fitted() -> None:
-    recording = Recording("decay", np.arange(10.0), {"angle": Channel(np.arange(10.0), "rad")})
-    bench = UsedRecording("procedure", "decay.csv", recording, last=4.0)
-    fitted = UsedRecording("experiment", "copy.csv", recording, frozenset({"angle"}), 4.0, 9.0)
-    assert double_use([bench, fitted]) == ""
-    assert "would count twice" in double_use([bench, replace(fitted, first=3.0)])
-
-
-def test_a_recording_in_two_experiments_is_refused(solve: Solve) -> None:
-    again = STEP.replace('"step"', '"again"')
-    with pytest.raises(PpafoError, match=r"problem\.toml.*'step'.*'again'.*are the same recording"):
-        solve(f"{FIT}{again}")

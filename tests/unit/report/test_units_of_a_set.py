@@ -95,20 +95,6 @@ def test_find_answers_in_the_units_of_its_range_and_condition() -> None:
     assert "(N cm)" in found.plot().axes[0].get_ylabel()
 
 
-def test_a_refusal_is_in_the_unit_of_what_it_refuses_else_in_that_of_the_set(in_bar: str) -> None:
-    def refusal(*overrides: str) -> str:
-        with pytest.raises(ppafo.PpafoError) as caught:
-            ppafo.load_scenario(TASK, overrides=[f"device.set={in_bar}", *overrides])
-        return str(caught.value)
-
-    assert refusal("supply.pressure=2000 bar_g").endswith(
-        "must be at least 0.01 bar_a and at most 1000 bar_a (regulated pressure to chamber 1)"
-    )
-    assert "must be at least 0 mm^2 and at most 10000 mm^2" in refusal("valve.area=-1 mm^2")
-    lines = refusal("supply_line.plantarflexion.droop=1e8 Pa s/kg", "supply.dorsiflexion_pressure=5 bar_g")
-    assert "supply.dorsiflexion_pressure = 5 bar_g must not exceed supply.pressure = 3.44738 bar_g" in lines
-
-
 @pytest.mark.parametrize(
     ("value", "si_unit", "text"),
     [

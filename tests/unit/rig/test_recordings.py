@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.errors import DataError, ParameterError, PpafoError
+from ppafo.errors import DataError, PpafoError
 from ppafo.rig import RigRecording, list_presets, load_preset, record
 from ppafo.rig.experiments import EXPERIMENTS, on_scale, write_rig_recording
 from ppafo.rig.preset import PATHS, json_schema
@@ -269,20 +269,6 @@ def test_the_published_schema_takes_every_preset() -> None:
         jsonschema.validate(tomllib.loads(text), json_schema())
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(tomllib.loads(text.replace("[bench]", "[bensh]")), json_schema())
-
-
-def test_an_empty_preset_points_to_the_schema(tmp_path: Path) -> None:
-    (tmp_path / "mine.toml").write_text("")
-    with pytest.raises(ParameterError, match="'ppafo doctor --schema rig' prints its format"):
-        load_preset(tmp_path / "mine.toml")
-
-
-@pytest.mark.parametrize(
-    ("override", "argument"), [("device.set=cylinder-lever", "device"), ("device.valve=x", "valve")]
-)
-def test_the_device_of_the_bench_is_an_argument_and_no_override(override: str, argument: str) -> None:
-    with pytest.raises(ParameterError, match=f"the bench takes it as {argument}$"):
-        record("step-response", overrides=[override])
 
 
 def test_what_the_user_sets_takes_the_place_of_what_the_preset_sets() -> None:

@@ -9,7 +9,7 @@ from ppafo.processor.controller import FixedPointController, PythonProcessor, fi
 from ppafo.processor.fixed_point import read
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
-from ppafo.simulation.loading import load_scenario, scenario_from_dict
+from ppafo.simulation.loading import load_scenario
 
 FIXED = "controller.kind=pid_fixed_point"
 
@@ -69,10 +69,3 @@ def test_fewer_bits_cost_more_and_can_be_a_column() -> None:
 def test_what_whole_numbers_cannot_hold_is_refused(overrides: tuple[str, ...], said: str) -> None:
     with pytest.raises(ScenarioError, match=said):
         simulate(load_scenario("torque-task-proportional", (FIXED, *overrides)))
-
-
-def test_a_converter_without_whole_numbers_is_refused() -> None:
-    content = dict(load_scenario("torque-task-proportional").origin.content)
-    content["controller"] = {**content["controller"], "converter_bits": 10}
-    with pytest.raises(ScenarioError, match=r"unknown key 'controller.converter_bits'"):
-        scenario_from_dict(content)

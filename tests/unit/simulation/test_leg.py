@@ -144,11 +144,6 @@ def test_a_shank_with_corners_is_refused_in_one_line() -> None:
         on_leg({"kind": "ramp_hold", "level": "10 deg"})
 
 
-def test_a_gait_that_is_not_there_is_refused_in_one_line() -> None:
-    with pytest.raises(ScenarioError, match=r"motion\.shank\.gait = 'nobody'"):
-        on_leg({"kind": "gait", "gait": "nobody"})
-
-
 def test_one_override_takes_the_leg_off() -> None:
     scenario = on_leg(AT_REST, "motion.kind=free")
     assert scenario.motion == FreeMotion(math.radians(60.0))

@@ -125,8 +125,3 @@ def test_knots_out_of_order_or_at_one_time_are_refused_wherever_they_come_from()
         assert screen_columns(check_columns(scenario, {last: np.array([0.03, time])})).reasons == {1: said}
     with pytest.raises(ScenarioError, match=r"must be later than the first knot, 0 s"):
         load_scenario(name, ["reference.time_02=0 s"])
-
-
-def test_half_of_the_other_form_of_an_orifice_is_refused() -> None:
-    with pytest.raises(ScenarioError, match=r"also give valve.discharge_coefficient"):
-        with_numbers(load_scenario("cylinder-servo"), {"valve.area": 4e-6})

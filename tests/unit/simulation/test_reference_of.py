@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from ppafo.errors import ScenarioError
-from ppafo.processor.firmware import firmware
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import COMPLETED, REFUSED, run_ensemble
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
@@ -124,16 +123,6 @@ def test_an_ensemble_refuses_the_run_whose_pressure_no_supply_gives() -> None:
     assert ": 40 psi_g" in found.reasons[1]
 
 
-def test_an_ensemble_refuses_the_run_whose_reference_is_beyond_the_stops() -> None:
-    scenario = scenario_from_dict(document("angle", "95 deg", "cascade", **FREE))
-    levels = np.radians([90.0, 170.0])
-    found = run_ensemble(scenario, {"reference.level": levels}, ["rms_angle_error"])
-    assert found.status.tolist() == [COMPLETED, REFUSED]
-    assert "[reference] leaves the stops" in found.reasons[1]
-    with pytest.raises(ScenarioError, match="'reference'"):
-        run_ensemble(scenario, {"reference.level": levels[:1]}, [], bands=["reference"])
-
-
 def held_angle(scenario: Scenario) -> tuple[float, float, float]:
     """Largest error of the last 0.3 s [rad], reversals of the command, and how far the angle overshoots [rad]."""
     run = simulate(scenario)
@@ -202,12 +191,3 @@ def test_the_pressure_loop_that_ships_settles_on_its_level() -> None:
     metrics = simulate(load_scenario("pressure-loop")).metrics
     assert metrics["rms_pressure_1_error"].value < 0.3 * PSI
     assert metrics["final_pressure_1_error"].value < 0.03 * PSI
-
-
-def test_what_knows_a_torque_alone_says_so() -> None:
-    pressure = load_scenario("pressure-loop", ["run.duration=0.1 s"])
-    with pytest.raises(
-        ScenarioError,
-        match="a fixed-point controller follows a torque only; give a scenario",
-    ):
-        firmware(pressure)

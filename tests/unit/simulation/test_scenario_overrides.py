@@ -76,30 +76,6 @@ def test_a_gain_of_0_needs_no_unit_whatever_is_controlled() -> None:
         load_scenario("pressure-loop", ["controller.proportional_gain=1"])
 
 
-@pytest.mark.parametrize("override", ["motion.angle=80", "run.duration=2", "reference.level=5", "sensors.delay=1"])
-def test_any_other_value_must_say_its_unit(override: str) -> None:
-    assert "a number without a unit" in problem_of(override)
-
-
-@pytest.mark.parametrize(
-    ("override", "nearest"),
-    [
-        ("motion.angel=3 deg", "motion.angle"),
-        ("controller.integral_gian=1", "controller.integral_gain"),
-        ("moton.angle=3 deg", "motion.angle"),
-        ("suply.pressure=3 psi_g", "supply.pressure"),
-        ("vlave.area=3 mm^2", "valve.area"),
-    ],
-)
-def test_an_unknown_path_is_answered_with_the_nearest_of_scenario_and_device(override: str, nearest: str) -> None:
-    assert f"did you mean '{nearest}'?" in problem_of(override)
-
-
-@pytest.mark.parametrize("override", ["run.duration", "=3", "run.duration=", "", "run.duration 3"])
-def test_what_is_not_path_and_value_is_refused(override: str) -> None:
-    assert "is not of the form PATH=VALUE" in problem_of(override)
-
-
 PATHS = [*OF_A_VANE.paths(load_scenario(TASK).origin.content), *device_paths()]
 
 
@@ -114,12 +90,6 @@ def test_any_override_text_is_taken_or_refused_cleanly(path: str, text: str) -> 
     except PpafoError as error:
         message = str(error)
     assert len(message.splitlines()) <= 1
-
-
-@pytest.mark.parametrize("section", ["controller", "reference", "gas_model"])
-def test_beside_a_setting_a_kind_that_is_not_known_is_the_mistake(section: str) -> None:
-    with pytest.raises(ScenarioError, match=rf"{section}\.kind = 'nothing' is not known"):
-        load_scenario(TASK, [f"{section}.band=1", f"{section}.kind=nothing"])
 
 
 @pytest.mark.parametrize(

@@ -72,30 +72,6 @@ def test_minutes_have_no_fraction() -> None:
     assert clock_seconds(["00:10.5", "00:11.0"], rows(2)).tolist() == [0.0, 0.5]
 
 
-@pytest.mark.parametrize(("order", "days"), [("day month", 1.0), ("month day", 31.0)])
-def test_dates_of_either_order_are_asked_about_where_it_matters(order: Any, days: float) -> None:
-    cells = ["03/04/2026 08:00:00", "04/04/2026 08:00:00"]
-    with pytest.raises(DataError, match='give date_order = "day month" or date_order = "month day"'):
-        clock_seconds(cells, rows(2))
-    expected = days if order == "day month" else 31.0
-    assert clock_seconds(cells, rows(2), order=order)[1] == expected * 86400.0
-
-
-@pytest.mark.parametrize(
-    ("cells", "message"),
-    [
-        (["25:61:00", "25:62:00"], "line 2: '25:61:00' is not a time of day"),
-        (["08:00:00", "noon"], "line 3: 'noon' is not a time of day such as"),
-        (["13:00:00 PM", "13:00:01 PM"], "is not a time of day"),
-        (["2026-13-41 08:00:00", "2026-13-41 08:00:01"], "line 2: '2026-13-41' is not a date such as"),
-        (["08:00:00 CEST", "07:30:00 CET"], "the times are in several time zones"),
-    ],
-)
-def test_what_is_no_time_is_named_with_its_line(cells: list[str], message: str) -> None:
-    with pytest.raises(DataError, match=message):
-        clock_seconds(cells, rows(2))
-
-
 @pytest.mark.parametrize("period", [2**32 * 1e-6, 2**32 * 1e-3], ids=["micros", "millis"])
 def test_a_counter_of_32_bits_is_counted_on(period: float) -> None:
     time = np.arange(0.0, 2.0, 0.01) + period - 1.0
@@ -129,12 +105,6 @@ def test_a_date_and_a_time_in_two_columns(tmp_path: Path) -> None:
 def test_a_rate_stands_for_a_column_of_time(tmp_path: Path) -> None:
     for rate in ("100 Hz", "100 1/s", "6000 1/min"):
         assert np.allclose(read(tmp_path, "M\n1\n2\n3\n", {"rate": rate}).time, [0.0, 0.01, 0.02])
-
-
-@pytest.mark.parametrize("rate", ["0 Hz", "-1 Hz", "10 ms", "often"])
-def test_what_is_no_rate_is_named_with_its_key(tmp_path: Path, rate: str) -> None:
-    with pytest.raises(DataError, match=r"channels\.time\.rate = "):
-        read(tmp_path, "M\n1\n2\n", {"rate": rate})
 
 
 def test_many_rows_in_a_second_are_answered_with_a_rate_that_works(tmp_path: Path) -> None:

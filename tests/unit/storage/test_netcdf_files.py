@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import h5netcdf
 import numpy as np
 import pytest
 
@@ -56,54 +55,6 @@ def test_a_file_cut_off_anywhere_is_refused_by_name(tmp_path: Path) -> None:
         path.write_bytes(whole[: int(len(whole) * share)])
         with pytest.raises(DataError, match="not a complete NetCDF recording"):
             read_netcdf(path)
-
-
-@pytest.mark.parametrize("content", [b"time [s],angle [rad]\n0,1\n", b"\x00" * 100, b"CDF\x01" + b"\x00" * 60])
-def test_a_file_of_another_kind_is_refused_by_name(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "other.nc"
-    path.write_bytes(content)
-    with pytest.raises(DataError, match=r"other\.nc: is not a complete NetCDF recording"):
-        read_netcdf(path)
-
-
-def test_an_empty_file_is_refused_as_empty(tmp_path: Path) -> None:
-    path = tmp_path / "empty.nc"
-    path.touch()
-    with pytest.raises(DataError, match="is empty"):
-        read_netcdf(path)
-
-
-def changed(folder: Path, variable: str, units: str) -> Path:
-    path = written(folder, recording())
-    with h5netcdf.File(path, "a") as file:
-        file.variables[variable].attrs["units"] = units
-    return path
-
-
-def test_a_wrong_unit_is_refused_by_file_and_channel(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match=r"bench\.nc: .*channel 'angle' must be in 'rad', not in 'deg'"):
-        read_netcdf(changed(tmp_path, "angle", "deg"))
-    with pytest.raises(DataError, match=r"'time' must be in 's', not in 'ms'"):
-        read_netcdf(changed(tmp_path, "time", "ms"))
-
-
-def test_a_dataset_of_something_else_is_refused(tmp_path: Path) -> None:
-    import xarray
-
-    path = tmp_path / "map.nc"
-    xarray.Dataset({"height": (("x", "y"), np.zeros((2, 3)))}).to_netcdf(path, engine="h5netcdf")
-    with pytest.raises(DataError, match="has no variable 'time'"):
-        read_netcdf(path)
-
-
-def test_a_channel_of_two_dimensions_is_refused(tmp_path: Path) -> None:
-    import xarray
-
-    path = tmp_path / "two.nc"
-    made = xarray.Dataset({"angle": (("time", "y"), np.zeros((2, 3)))}, {"time": ("time", [0.0, 1.0], {"units": "s"})})
-    made.to_netcdf(path, engine="h5netcdf")
-    with pytest.raises(DataError, match="'angle' must be numeric and one-dimensional over 'time'"):
-        read_netcdf(path)
 
 
 def test_what_a_channel_declares_between_its_samples_is_an_attribute(tmp_path: Path) -> None:

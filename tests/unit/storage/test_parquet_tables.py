@@ -42,21 +42,3 @@ def test_columns_come_back_with_their_units() -> None:
 def test_a_file_that_is_not_whole_is_refused(damage: object) -> None:
     with pytest.raises(DataError, match="file: is not a complete Parquet file"):
         read_parquet(io.BytesIO(damage(content())), "file")  # type: ignore[operator]
-
-
-def test_a_changed_bit_in_the_data_is_found_by_the_checksum_of_its_page() -> None:
-    import pyarrow.parquet
-
-    whole = content()
-    column = pyarrow.parquet.ParquetFile(io.BytesIO(whole)).metadata.row_group(0).column(1)
-    place = column.data_page_offset + column.total_compressed_size // 2
-    with pytest.raises(DataError, match="not a complete Parquet file"):
-        read_parquet(io.BytesIO(whole[:place] + bytes([whole[place] ^ 4]) + whole[place + 1 :]), "file")
-
-
-def test_table_of_more_values_than_any_of_ours_is_refused_before_it_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ppafo.storage.parquet._MAXIMUM_VALUES", 3999)
-    with pytest.raises(DataError, match="file: has 4,000 values; a table of a study has at most"):
-        read_parquet(io.BytesIO(content()), "file")
-    monkeypatch.setattr("ppafo.storage.parquet._MAXIMUM_VALUES", 4000)
-    assert read_parquet(io.BytesIO(content()), "file").num_rows == 500

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from ppafo.errors import StudyError
-from ppafo.simulation.loading import load_scenario
 from ppafo.studies.draws import uncertainty_of
 from ppafo.studies.intervals import effective_sample_size, fraction_interval, replicates_interval
-from ppafo.studies.limits import MetricLimit, check_metrics
+from ppafo.studies.limits import MetricLimit
 from ppafo.studies.loading import drawn_in, load_study
 
 
@@ -73,24 +72,6 @@ def test_a_choice_of_configurations_is_not_made_in_silence() -> None:
         drawn_in(whole, (), None)
     with pytest.raises(StudyError, match="no configuration 'solenoids', did you mean 'solenoid'"):
         drawn_in(whole, (), "solenoids")
-
-
-def test_a_grid_has_no_probability() -> None:
-    document = study(correlations=[], sample=None)
-    document["vary"] = [{"path": "valve.area", "kind": "list", "values": ["10 mm^2", "11 mm^2"]}]
-    del document["sample"]
-    with pytest.raises(StudyError, match=r"'valve.area' is varied over a grid or list, which has no probabilities"):
-        uncertainty_of(load_study(document))
-
-
-def test_metrics_are_checked_before_anything_runs() -> None:
-    closed, opened = load_scenario("torque-task-proportional"), load_scenario("step-response")
-    with pytest.raises(StudyError, match="no metric 'rms_eror', did you mean 'rms_error'"):
-        check_metrics(["rms_eror"], closed)
-    with pytest.raises(StudyError, match="has no 'rms_error': the controller has no reference"):
-        check_metrics(["rms_error"], opened)
-    with pytest.raises(StudyError, match="'peak_error' is named twice"):
-        check_metrics(["peak_error", "peak_error"], closed)
 
 
 def test_the_interval_of_a_mean_is_the_one_of_student_over_replicates() -> None:

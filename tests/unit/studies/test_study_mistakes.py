@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 
-from ppafo.analyses.sweep import sweep
 from ppafo.errors import StudyError
 from ppafo.studies.loading import list_studies, load_study
 
@@ -65,19 +64,6 @@ def test_a_path_must_exist_in_every_configuration_that_varies_it(varying: Callab
     assert "did you mean 'proportional'?" in refused(document)
 
 
-def test_a_path_is_varied_once(varying: Callable[..., Any]) -> None:
-    assert "'valve.area' is varied twice" in refused(varying(AREA, CD, AREA))
-
-
-@pytest.mark.parametrize("outputs", [{"metrics": []}, None])
-def test_a_study_that_keeps_nothing_is_no_sweep_but_a_study(outputs: Any, small: Any) -> None:
-    small["outputs"] = outputs
-    document = {key: value for key, value in small.items() if value is not None}
-    study = load_study(document)
-    with pytest.raises(StudyError, match=r"study 'small': \[outputs\] is empty: give metrics"):
-        sweep(study)
-
-
 def test_a_study_that_varies_nothing_is_refused_unless_it_compares(small: Any) -> None:
     for key in ("vary", "correlations", "sample"):
         del small[key]
@@ -101,16 +87,6 @@ def test_unknown_outputs_are_refused_with_the_nearest(small: Any, outputs: Any, 
     assert expected in refused(small)
 
 
-def test_the_duration_varies_only_where_nothing_is_kept_over_time(small: Any) -> None:
-    small["vary"].append({"path": "run.duration", "kind": "list", "values": ["0.1 s", "0.2 s"]})
-    assert "'run.duration' cannot vary with trajectories or bands" in refused(small)
-    small["outputs"] = {"metrics": ["rms_error"]}
-    assert "'run.duration=0.2 s' is set and 'run.duration' is varied" in refused(small)
-    for table in small["configurations"]:
-        table["overrides"] = [text for text in table["overrides"] if not text.startswith("run.duration")]
-    assert load_study(small).runs == 64
-
-
 def test_metrics_of_tracking_need_a_reference(varying: Callable[..., Any]) -> None:
     document = varying(AREA)
     document["configurations"] = [{"name": "step", "scenario": "step-response"}]
@@ -118,15 +94,6 @@ def test_metrics_of_tracking_need_a_reference(varying: Callable[..., Any]) -> No
     document["outputs"] = {"metrics": "all"}
     assert "rms_error" not in load_study(document).outputs.metrics
     assert "gas_supplied" in load_study(document).outputs.metrics
-
-
-def test_correlations_that_cannot_hold_at_once_are_refused(varying: Callable[..., Any]) -> None:
-    document = varying(AREA, LEAK, CD)
-    pairs = [("valve.area", "actuator.leak.area", 0.6), ("valve.area", CD["path"], 0.6)]
-    document["correlations"] = [{"between": [one, other], "coefficient": value} for one, other, value in pairs]
-    assert load_study(document).scores is not None
-    document["correlations"].append({"between": ["actuator.leak.area", CD["path"]], "coefficient": -0.9})
-    assert "not positive definite (valve.area with actuator.leak.area: 0.6" in refused(document)
 
 
 @pytest.mark.parametrize(
@@ -144,22 +111,6 @@ def test_single_correlations_are_checked(
     document = varying(AREA, LEAK, {"path": "reference.level", "kind": "list", "values": ["5 N m"]})
     document["correlations"] = [{"between": between, "coefficient": coefficient}]
     assert expected in refused(document)
-
-
-def test_distributions_need_a_sample_and_a_grid_has_none(varying: Callable[..., Any]) -> None:
-    document = varying(AREA)
-    del document["sample"]
-    with pytest.raises(StudyError, match="'sample' is missing"):
-        sweep(document)
-    with pytest.raises(StudyError, match="'sample' is missing"):
-        load_study(document, draws=4)
-    document = varying({"path": "valve.area", "kind": "list", "values": ["10 mm^2"]})
-    assert "[sample] is given, but no value has a distribution" in refused(document)
-    del document["sample"]
-    with pytest.raises(StudyError, match=r"has no \[sample\], so the runs are not random"):
-        load_study(document, draws=4)
-    with pytest.raises(StudyError, match="omit draws and seed"):
-        load_study(document, seed=4)
 
 
 @pytest.mark.parametrize("name", list_studies())

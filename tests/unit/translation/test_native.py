@@ -9,21 +9,17 @@ import pytest
 
 from ppafo.engine import loading
 from ppafo.engine.cache.tidying import list_programs
-from ppafo.engine.compilers import CompilerError
 from ppafo.engine.lanes import Batch, load_program, run_batch
-from ppafo.engine.loading import load_generated
 from ppafo.engine.run import batch_of
-from ppafo.errors import ProgramError, SimulationError
+from ppafo.errors import SimulationError
 from ppafo.golden_bits import digest
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.translation import compiling, native
-from ppafo.translation.native_source import translated_text
 from scripts.golden_bits import drawn_batch
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
 SHORT = ["run.duration=20 ms"]
-NO_C = "import math\n@entry('void(float64[:, ::1])')\ndef advance(x):\n    x[0, 0] = math.sin(x[0, 0])\n"
 
 
 @pytest.fixture(scope="module")
@@ -90,45 +86,3 @@ def test_a_computer_without_a_compiler_says_what_to_install(
     monkeypatch.setenv("PPAFO_BACKEND", name)
     with pytest.raises(SimulationError, match=rf"PPAFO_BACKEND={name}: {missing}.*gcc or clang.*ppafo\[native\]"):
         load_program(batch_of(plan_run(load_scenario("torque-task-proportional", SHORT))).program)
-
-
-OBEYS = '#!/bin/sh\n[ "$1" = --version ] && echo "fake 1" && exit 0\n'
-BROKEN = {
-    "no interpreter": ("#!/no/such/interpreter\n", "cannot be run: no such file or directory"),
-    "no library": (f"{OBEYS}exit 0\n", "reported success but wrote no library"),
-    "half a library": (
-        f'{OBEYS}for word; do [ "$last" = -o ] && printf half > "$word"; last="$word"; done\n',
-        "the library of a compiled model cannot be loaded: .*file too short",
-    ),
-    "another library": (
-        f'{OBEYS}for word; do last="$own"; [ "$flag" = -o ] && own="$word"; flag="$word"; done\n'
-        'echo "int x;" | exec REAL -shared -fPIC -xc - -o "$own"\n',
-        "lacks functions of the model",
-    ),
-    "killed": (f"{OBEYS}kill -9 $$\n", "does not compile a model: it returned -9"),
-}
-
-
-@needs_gcc
-@pytest.mark.skipif(sys.platform == "win32", reason="the compilers that fail are shell scripts")
-@pytest.mark.parametrize("how", BROKEN)
-def test_a_compiler_that_fails_halfway_is_said_in_one_line_and_leaves_nothing(
-    how: str,
-    fresh_cache: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    script, line = BROKEN[how]
-    broken = tmp_path / "gcc"
-    broken.write_text(script.replace("REAL", str(shutil.which("gcc"))), encoding="utf-8")
-    broken.chmod(0o755)
-    compiler = native.CCompiler("gcc", (str(broken),))
-    source = f"@entry('void(float64[:, ::1])')\ndef advance(x):\n    x[0, 0] = {len(how)}.5\n"
-    with pytest.raises(CompilerError, match=line):
-        load_generated(source, compiler)
-    assert list(fresh_cache.iterdir()) == []
-
-
-def test_what_has_no_c_is_refused() -> None:
-    with pytest.raises(ProgramError, match="cannot be translated"):
-        translated_text(NO_C)

@@ -2,20 +2,15 @@
 
 import math
 import tomllib
-from dataclasses import replace
 from importlib import resources
-from pathlib import Path
 
 import jsonschema
 import pytest
 
-from ppafo.errors import ArgumentError, ParameterError, ScenarioError
-from ppafo.gait import load_gait
-from ppafo.gait.document import gait_toml
+from ppafo.errors import ParameterError, ScenarioError
 from ppafo.simulation.plan import plan_run
-from ppafo.walking import list_walks, load_walk, walk
+from ppafo.walking import list_walks, load_walk
 from ppafo.walking.declaration import json_schema
-from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import gait_sensors_of
 
 MISTAKES = {
@@ -62,30 +57,3 @@ def test_the_published_schema_accepts_the_shipped_walks_and_no_unknown_key() -> 
         jsonschema.validate(document, schema)
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate({**document, "wearers": {}}, schema)
-
-
-def test_force_sensors_need_a_gait_with_a_ground_reaction(tmp_path: Path) -> None:
-    bare = replace(load_gait(), name="bare", vertical_force=None, ankle_moment=None, centre_of_pressure=None)
-    path = tmp_path / "bare.toml"
-    path.write_text(gait_toml(bare))
-    with pytest.raises(ScenarioError, match="vertical_force"):
-        load_walk("solenoid", gait=path)
-    assert walk_of(load_walk("off", gait=path)).gait.name == "bare"
-
-
-@pytest.mark.parametrize("minutes", [0.05, 61.0])
-def test_a_walk_too_short_or_too_long_is_refused(minutes: float) -> None:
-    with pytest.raises(ScenarioError, match=r"0\.087 min.* 60 min"):
-        walk("solenoid", minutes=minutes)
-
-
-@pytest.mark.parametrize("minutes", [-1.0, float("nan"), float("inf")])
-def test_what_is_no_number_of_minutes_is_refused(minutes: float) -> None:
-    with pytest.raises(ArgumentError, match=rf"^minutes={minutes}: "):
-        walk("solenoid", minutes=minutes)
-
-
-def test_overrides_beside_a_configuration_are_refused() -> None:
-    configuration = load_walk("off")
-    with pytest.raises(ScenarioError, match="overrides"):
-        walk(configuration, minutes=0.1, overrides=["wearer.body_mass=80 kg"])

@@ -1,7 +1,6 @@
 """Regulators and lines of a walk file: values with their origin, overrides, mistakes, and what is recorded."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -57,14 +56,6 @@ def test_a_mistake_is_named_in_one_line(override: str) -> None:
     with pytest.raises((ScenarioError, ParameterError), match=MISTAKES[override]) as caught:
         load_walk("solenoid-regulators", [override])
     assert "\n" not in str(caught.value)
-
-
-def test_an_unknown_line_of_a_walk_file_is_named(tmp_path: Path) -> None:
-    path = tmp_path / "own.toml"
-    head = 'schema_version = 1\nname = "own"\n[device]\nset = "ppafo2011"\nvalve = "solenoid"\n'
-    path.write_text(f'{head}[controller]\nkind = "off"\n[supply_line.knee]\ndroop = "3 Pa s/kg"\n')
-    with pytest.raises(ScenarioError, match=r"supply_line.*knee"):
-        load_walk(path)
 
 
 def test_the_recording_has_line_pressures_only_where_there_are_lines() -> None:

@@ -11,9 +11,8 @@ import pytest
 
 import ppafo
 from ppafo.cli.main import main
-from ppafo.errors import DataError, ScenarioError
+from ppafo.errors import ScenarioError
 from ppafo.loading import json_schema, list_all_scenarios, load_scenario, scenario_from_dict
-from ppafo.simulation.loading import load_scenario as load_vane
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 
@@ -57,13 +56,6 @@ def test_a_gait_may_stand_in_the_motion_or_above_and_not_in_both(tmp_path: Path)
         load_scenario(written(tmp_path, gait + text_of(NAME) + MOTION + gait))
 
 
-def test_an_override_means_the_same_under_either_path() -> None:
-    one, other = (load_scenario(NAME, [f"{path}=falisse2019-subject1"]) for path in ("gait", "motion.gait"))
-    assert walk_of(one) == walk_of(other)
-    with pytest.raises(ScenarioError, match=r"overrides 'gait=other' and 'motion\.gait=mine' set the same value"):
-        load_walk(NAME, ["motion.gait=mine"], gait="other")
-
-
 def test_a_gait_beside_a_file_in_another_folder_is_found_by_its_relative_path(tmp_path: Path) -> None:
     gait = (resources.files("ppafo") / "gait" / "normative" / "falisse2019-subject1.toml").read_text(encoding="utf-8")
     (tmp_path / "own.toml").write_text(gait)
@@ -89,44 +81,6 @@ MISTAKES: dict[str, tuple[str, str]] = {
     ),
     "a gait that is a number": ("gait = 3\n", "gait = 3 must be a text"),
 }
-
-
-@pytest.mark.parametrize("what", MISTAKES)
-def test_a_mistake_in_a_walk_is_one_line(what: str, tmp_path: Path) -> None:
-    added, message = MISTAKES[what]
-    with pytest.raises(ScenarioError, match=message):
-        load_scenario(written(tmp_path, text_of(NAME) + MOTION + added))
-
-
-def test_a_walk_takes_its_own_motion_and_names_the_kinds_that_exist(tmp_path: Path) -> None:
-    assert load_walk(NAME, ["motion.kind=walk"]).controller == load_walk(NAME).controller
-    with pytest.raises(
-        ScenarioError,
-        match=r"override 'motion\.kind=free': motion.kind = 'free': a walk file needs motion.kind = 'walk'",
-    ):
-        load_walk(NAME, ["motion.kind=free"])
-    misspelt = written(tmp_path, (text_of(NAME) + MOTION).replace('"walk"', '"wlak"'))
-    with pytest.raises(
-        ScenarioError, match=r"\.toml: motion\.kind = 'wlak' .* allowed: free, locked, prescribed, leg, walk"
-    ):
-        load_walk(misspelt)
-
-
-def test_a_gait_that_is_not_there_names_the_file_and_the_key(tmp_path: Path) -> None:
-    file = written(tmp_path, f'gait = "nobody"\n{text_of(NAME)}')
-    with pytest.raises(DataError, match=rf"{file.name}: line 1: gait = 'nobody': there is no gait 'nobody'"):
-        load_walk(file)
-    with pytest.raises(DataError, match=rf"^{NAME}: override gait=nobody: there is no gait 'nobody'"):
-        load_walk(NAME, ["gait=nobody"])
-    with pytest.raises(DataError, match=rf"^{NAME}: override gait=nobody: there is no gait 'nobody'"):
-        load_walk(NAME, gait="nobody")
-
-
-def test_where_only_a_vane_will_do_a_walk_is_refused_by_its_motion(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match="a walk needs a walk file, not a scenario file"):
-        load_vane(written(tmp_path, text_of(NAME) + MOTION))
-    with pytest.raises(ScenarioError, match=r"override 'motion\.kind=walk': motion.kind: a walk needs a walk file"):
-        load_scenario("torque-task-proportional", ["motion.kind=walk"])
 
 
 def test_the_schema_of_scenarios_takes_every_shipped_one_and_a_motion_that_is_a_walk() -> None:

@@ -193,30 +193,3 @@ def test_a_scenario_that_was_changed_in_python_is_not_changed_back_in_silence() 
     other = replace(scenario, name="longer", run=replace(scenario.run, duration=4.0))
     with pytest.raises(StudyError, match="'longer' was changed in Python"):
         compare([scenario, other], tasks={"slow": ["reference.ramp_time=2 s"]})
-
-
-@pytest.mark.parametrize(
-    ("path", "override", "ends"),
-    [
-        ("supply.pressure", "supply.pressure=60 psi_g", ("45 psi_g", "55 psi_g")),
-        ("controller.rate", "controller.rate=500 Hz", ("400 Hz", "1000 Hz")),
-    ],
-)
-def test_a_value_that_is_drawn_for_all_and_set_in_one_is_refused(
-    path: str, override: str, ends: tuple[str, str]
-) -> None:
-    vary = {"path": path, "kind": "uniform", "minimum": ends[0], "maximum": ends[1]}
-    study = {
-        "schema_version": 1,
-        "name": "drawn",
-        "configurations": [{"name": "one", "scenario": "torque-task-proportional"}],
-        "vary": [vary],
-        "sample": {"method": "random", "runs": 8},
-        "outputs": {"metrics": ["rms_error"]},
-    }
-    pair = {
-        name: ppafo.load_scenario("torque-task-proportional", ["run.duration=0.2 s", *own])
-        for name, own in (("one", []), ("other", [override]))
-    }
-    with pytest.raises(StudyError, match=f"the study draws '{path}' for every configuration, so the values"):
-        compare(pair, study=study, draws=32)

@@ -238,16 +238,6 @@ def test_a_share_of_the_moment_of_a_wearer_is_a_profile(tmp_path: Path, name: st
     assert profile.table_error < 0.01 * profile.largest * most
 
 
-def test_a_profile_that_is_given_replaces_that_of_the_file_and_its_paths_count_from_here(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "ankle.csv").write_text("time [s],torque [N m]\n0,1\n0.5,2\n1,1\n")
-    assert load_design(folder / "trapezium.toml", profile="ankle.csv").profile.largest == 2.0
-    with pytest.raises(PpafoError, match="give it to load_design"):
-        design(load_design(folder / "trapezium.toml"), profile="ankle.csv")
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -331,22 +321,6 @@ def test_every_mistake_in_a_file_is_one_line(tmp_path: Path, before: str, after:
     path.write_text(FILE.replace(before, after, 1))
     with pytest.raises(PpafoError, match=re.escape(message)) as caught:
         load_design(path)
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ("time [s],torque [N]\n0,1\n1,2\n", "unit 'N' does not fit"),
-        ("time [s],moment [N m]\n0,1\n1,2\n", "there is no channel 'torque'"),
-        ("time [s],torque [N m]\n0,1\n", "has only one sample"),
-    ],
-)
-def test_a_recording_that_is_no_profile_is_one_line(tmp_path: Path, content: str, message: str) -> None:
-    (tmp_path / "r.csv").write_text(content)
-    (tmp_path / "wrong.toml").write_text(re.sub(r"time = .*\ntorque = .*\n", 'recording = "r.csv"\n', FILE))
-    with pytest.raises(PpafoError, match=re.escape(message)) as caught:
-        load_design(tmp_path / "wrong.toml")
     assert "\n" not in str(caught.value)
 
 

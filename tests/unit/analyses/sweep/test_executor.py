@@ -2,7 +2,6 @@
 
 import copy
 import os
-import pickle
 import signal
 import subprocess
 import sys
@@ -18,7 +17,7 @@ import ppafo
 from ppafo.analyses.study_results import StudyResults
 from ppafo.errors import StudyError
 from ppafo.progress import Progress
-from ppafo.study.executing import _computed, computed_by, executor_of
+from ppafo.study.executing import computed_by
 from tests.unit.analyses.sweep.test_run_study import contents
 
 PAIR = {"metrics": "rms_error", "configuration": "solenoid", "samples": 64}
@@ -65,28 +64,6 @@ def test_a_lost_block_is_submitted_again_and_given_up_in_the_end() -> None:
     pool.shutdown()
     with pytest.raises(StudyError, match="takes no more work"):
         list(computed_by(pool, abs, [-4]))
-
-
-def test_what_cannot_be_loaded_or_sent_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "my_law.py").write_text("def law(block): return block")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(tmp_path)
-    import my_law  # type: ignore[import-not-found]
-
-    sent = pickle.dumps(my_law.law)
-    monkeypatch.setattr(sys, "path", [])
-    monkeypatch.delitem(sys.modules, "my_law")
-    with pytest.raises(StudyError, match="a worker cannot load the study: No module named 'my_law'; install"):
-        _computed(sent, 1, ppafo.__version__, "")
-    with pytest.raises(StudyError, match=f"a worker has ppafo {ppafo.__version__}, not 0.0.1; install the same"):
-        _computed(sent, 1, "0.0.1", "")
-    with pytest.raises(StudyError, match="a class or function of the study cannot be sent to workers"):
-        list(computed_by(ThreadPoolExecutor(1), lambda block: block, [1]))
-    (tmp_path / "my_pools.py").write_text("def pool(): raise RuntimeError('no queue answers')")
-    monkeypatch.syspath_prepend(tmp_path)
-    for word in ("nowhere:POOL", "math:nothing", "math:pi", "my_pools:pool"):
-        with pytest.raises(StudyError, match=f"executor = '{word}'"):
-            executor_of(word)
 
 
 CALLER = """

@@ -2,7 +2,6 @@
 
 import re
 from functools import cache, partial
-from pathlib import Path
 from typing import Any
 
 import jsonschema
@@ -171,15 +170,6 @@ def test_a_goal_that_is_zero_before_needs_a_scale() -> None:
     document = changed(objective=[{"metric": "mechanical_work"}])
     with pytest.raises(StudyError, match="'mechanical_work' is 0 before tuning, which cannot be its scale; set"):
         tune(document)
-
-
-def test_a_scenario_of_a_file_is_pasted_by_its_file(tmp_path: Path) -> None:
-    file = tmp_path / "my ankle.toml"
-    file.write_bytes((Path(ppafo.__file__).parent / "scenarios" / "torque-task-proportional.toml").read_bytes())
-    finding = tune(changed(scenario=str(file), effort={"starts": 1, "generations": 1, "candidates_per_gain": 4}))
-    pasted = finding.files["overrides.txt"]().decode()
-    assert f"ppafo.simulate({str(file)!r}, overrides=[" in pasted
-    assert f"ppafo simulate '{file}' --set" in str(finding)
 
 
 def test_gains_with_which_the_loop_oscillates_are_not_recommended_however_they_score() -> None:
