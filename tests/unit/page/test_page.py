@@ -1,5 +1,6 @@
 """The page that simulates, in a headless Chromium: asks for nothing, complains of nothing, has the bits of Python."""
 
+import importlib.util
 import json
 import random
 import shlex
@@ -10,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from ppafo.errors import PpafoError, ScenarioError
+from ppafo.errors import PpafoError, ProgramError, ScenarioError
 from ppafo.page.workbench import _checksum, workbench
 from ppafo.running import simulate
 from ppafo.simulation.loading import list_scenarios
@@ -28,6 +29,13 @@ DRAWN = {
 def test_a_slider_that_no_scenario_has_is_refused() -> None:
     with pytest.raises(ScenarioError, match=r"valve\.colour"):
         workbench(TASKS[:1], sliders=["valve.colour"])
+
+
+def test_without_a_compiler_the_refusal_says_how_to_get_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
+    monkeypatch.setattr(shutil, "which", lambda _name: None)
+    with pytest.raises(ProgramError, match=r"^a page needs a compiler .*pip install 'ppafo\[workbench\]', or clang"):
+        workbench(TASKS[:1])
 
 
 @pytest.fixture(scope="module")
@@ -135,6 +143,46 @@ def test_a_reload_keeps_settings_and_the_curves_of_another_valve(page: Any) -> N
     page.locator("#legend li").nth(3).wait_for()
     _wait(page)
     assert [page.locator(part).text_content() for part in ("#results", "#legend", "#command")] == before
+
+
+def test_each_cause_of_a_refusal_has_words_of_its_own_and_what_is_out_of_reach_a_curve(page: Any) -> None:
+    _restored(page, TASKS[1])
+    assert "required, within reach" in page.locator("#legend").text_content()
+    assert "The reference is beyond the reach of the actuator by up to 0.9979 N m." in _wait(page)
+    assert "Valve area = nothing is out of range" in _typed(page, "Valve area mm²", "")
+    _restored(page, TASKS[1])
+    said = _typed(page, "Supply pressure psi gauge", "20000")
+    assert "it must be at least \N{MINUS SIGN}14.55 psi gauge and at most 14490 psi gauge. The curves" in said
+    _restored(page, TASKS[1])
+    said = _typed(page, "Valve area mm²", "-3")
+    assert "Valve area = \N{MINUS SIGN}3 mm² is out of range: it must be at least 0 mm² and at most" in said
+    _restored(page, TASKS[1])
+    said = _typed(page, "Upper stop deg", "25")
+    assert "Ankle angle = 75 deg contradicts another setting: it must be at least Lower stop and at most Upper" in said
+    _restored(page, TASKS[1])
+    _typed(page, "Torque to hold N m", "3")
+    assert "within reach" not in page.locator("#legend").text_content()
+    assert page.locator("#panels figure").count() == page.locator("#panels figure.wide").count() + 2
+    address = page.url.partition("#")[0]
+    page.goto("about:blank")
+    page.goto(f"{address}#{TASKS[1]}&nosuch=1&supply.pressure=70000")
+    said = _wait(page)
+    assert 'nosuch".' in said
+    assert 'needs functions that this page has not: write a page with --set "supply.pressure=..."' in said
+    assert said.endswith("The curves are those as written.")
+    assert page.wrong == []
+
+
+@pytest.mark.long
+def test_every_scenario_has_the_bits_of_python(browser: Any, tmp_path: Path) -> None:
+    names = (*list_scenarios(), *list_walks())
+    opened = _opened(browser, tmp_path / "page.html", names)
+    for name in names:
+        opened.select_option("#scenario", name)
+        opened.locator(f"#command:text-is('ppafo simulate {name}')").wait_for()
+        _wait(opened)
+        assert "to the last bit" in opened.locator("#check").text_content(), name
+    assert opened.wrong == []
 
 
 @pytest.mark.long
