@@ -72,3 +72,12 @@ def test_a_document_that_was_changed_is_named(name: str, said: str, results: Pat
     (folder / name).write_text(json.dumps(document | {"runs": 9}), encoding="utf-8")
     with pytest.raises(DataError, match=said):
         ppafo.load_study_results(folder)
+
+
+@pytest.mark.parametrize("name", ["bands.parquet", "runs/chunk-0000000.parquet"])
+def test_a_table_that_is_missing_is_named(name: str, results: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    shutil.copytree(results, folder)
+    (folder / name).unlink()
+    with pytest.raises(DataError, match=rf"{name}: is missing or damaged; run the study again"):
+        ppafo.load_study_results(folder).plot()

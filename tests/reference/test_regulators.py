@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 import ppafo
 from ppafo.engine.scheme.pneumatics import GAMMA
+from ppafo.errors import ParameterError, ScenarioError
 from ppafo.metrics.settled import SettledPart
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.valves.kind import VENT
@@ -202,6 +203,28 @@ def test_a_verdict_names_the_number_of_the_regulator_that_is_at_fault(
     verdict = verdict_of(simulate(scenario))
     assert verdict.cause == f"the set pressure is kept off the command by `valve.{number}`"
     assert "it follows, as a further run shows" in verdict.tried
+
+
+@pytest.mark.parametrize(
+    ("law", "change", "said"),
+    [
+        ("pid_feedforward", "valve.delay=1 ms", "asks for a flow"),
+        ("pid", "valve.highest_pressure=0.01 bar_g", "lowest_pressure = 0.05 bar_g must be below"),
+        ("pid", "valve.lowest_pressure=-0.3 bar_g", "lowest_pressure = -0.3 bar_g must be at least supply.atmos"),
+        ("pid", "supply.pressure=-0.3 bar_g", "needs a supply above atmospheric pressure"),
+    ],
+)
+def test_what_regulators_cannot_do_is_refused(law: str, change: str, said: str) -> None:
+    with pytest.raises(ParameterError, match=said):
+        regulated(LOCKED, {"kind": law}, {"kind": "constant", "level": "1 N m"}, change)
+
+
+def test_questions_that_regulators_have_no_answer_to_are_refused() -> None:
+    scenario = regulated(LOCKED, {"kind": "pid"}, {"kind": "constant", "level": "1 N m"})
+    with pytest.raises(ScenarioError, match="regulates pressures, of which there is no linear model"):
+        ppafo.linearise(scenario)
+    with pytest.raises(ParameterError, match="fixed steps of a walk do not resolve"):
+        ppafo.load_walk("proportional", ["device.set=cylinder-lever", "device.valve=pressure_regulator"])
 
 
 @pytest.mark.long

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+import ppafo
+from ppafo import plugins
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
@@ -85,6 +87,20 @@ def test_a_name_of_one_of_our_own_is_refused_by_name(install: Install) -> None:
         "package"
     )
     assert CONTROLLERS["pid"] is ours
+
+
+def test_a_law_of_the_working_folder_is_named_and_no_file_alone_runs_code(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "beside.py").write_text(LAW.format(name="on_off", call="anything"))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(plugins, "_named", {})
+    path = list(sys.path)
+    scenario = ppafo.load_scenario("torque-task-proportional", ["controller.kind=beside:KIND"], plugins=["beside"])
+    assert scenario.controller.kind == "beside:KIND"
+    assert sys.path == path
+    with pytest.raises(ScenarioError, match="is not loaded, because a file alone must not run code"):
+        load_scenario("torque-task-proportional", ["controller.kind=json.tool:main"])
 
 
 def test_another_law_forgets_a_number_of_the_same_name_in_another_unit(monkeypatch: pytest.MonkeyPatch) -> None:

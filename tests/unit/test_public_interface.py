@@ -36,3 +36,11 @@ def test_importing_the_package_loads_nothing_heavy() -> None:
     code = f"import sys, ppafo; print([name for name in {heavy} if name in sys.modules])"
     printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert printed == "[]\n"
+
+
+def test_names_and_signatures_are_those_that_were_recorded() -> None:
+    written = runpy.run_path(str(ROOT / "scripts" / "public_api.py"))["public_api"]()
+    recorded = (ROOT / "tests" / "snapshots" / "public-api.txt").read_text(encoding="utf-8")
+    assert written.splitlines() == recorded.splitlines(), (
+        "if it is meant: python scripts/public_api.py, then CHANGELOG.md"
+    )

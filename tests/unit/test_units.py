@@ -3,6 +3,7 @@
 import decimal
 import math
 import re
+from collections.abc import Callable
 
 import pint
 import pytest
@@ -82,10 +83,63 @@ def test_a_bare_pressure_is_refused_with_the_ways_to_say_it_that_fit(unit: str) 
         parse_quantity(f"50 {unit}", "Pa_d")
 
 
+@pytest.mark.parametrize(("unit", "si_unit", "needed"), [("psi_d", "Pa_a", "level"), ("psi_g", "Pa_d", "difference")])
+def test_levels_and_differences_of_pressure_are_kept_apart(unit: str, si_unit: str, needed: str) -> None:
+    with pytest.raises(UnitError, match=f"'{unit}' is a .*, a pressure {needed} is needed"):
+        parse_quantity(f"50 {unit}", si_unit)
+
+
+@pytest.mark.parametrize(
+    "unit",
+    [
+        "kg_g",
+        "N m/psi_g",
+        "m)",
+        "2 m",
+        "m^",
+        "m//s",
+        "m/s kg",
+        "mm0",
+        "m;s",
+        "mm^0",
+        "m/s^-0",
+        "L/min (noon, air)",
+        "L/min (5 m, 1 bar, air)",
+        "L/min (0 degC, 1 bar_g, air)",
+        "kg (ANR)",
+        "mdegC",
+        "kdegC s",
+        "J/(kg udegC)",
+        "millidegC",
+        "kdegC_g",
+    ],
+)
+def test_what_is_no_unit_is_refused(unit: str) -> None:
+    with pytest.raises(UnitError):
+        check_unit(unit)
+
+
+@pytest.mark.parametrize(
+    ("text", "si_unit"), [("20", "rad"), ("20 deg", ""), ("3 rad/s", "Hz"), ("3 1/s", "rad/s"), ("3 mm", "m^2")]
+)
+def test_a_foreign_dimension_is_refused_and_angles_are_a_dimension(text: str, si_unit: str) -> None:
+    with pytest.raises(UnitError, match="does not fit"):
+        parse_quantity(text, si_unit)
+
+
 @pytest.mark.parametrize("text", ["nan m", "inf m", "-inf m", "1e999 m", "", "m", "--3 m", "0x10 m", "\u0661 m"])
 def test_what_is_not_a_finite_number_is_refused(text: str) -> None:
     with pytest.raises(UnitError):
         split_quantity(text)
+
+
+@pytest.mark.parametrize("convert", [to_si, from_si])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_numbers_that_are_not_finite_are_refused_in_both_directions(
+    convert: Callable[[float, str, str], float], value: float
+) -> None:
+    with pytest.raises(UnitError, match="not a finite number"):
+        convert(value, "m", "m")
 
 
 PSI = 6894.757293168361
@@ -275,6 +329,12 @@ def test_any_text_is_a_quantity_or_refused_as_none(unit: str, number: str) -> No
             assert math.isfinite(parse_quantity(f"{number} {unit}", si_unit))
         except UnitError as error:
             assert len(str(error).splitlines()) == 1
+
+
+@pytest.mark.parametrize("text", ["1e-400 m^3", "-0.5e-330", "\uff11 m", "\u0661 m", "1_000 m"])
+def test_a_number_that_would_become_0_or_has_other_digits_is_refused(text: str) -> None:
+    with pytest.raises(UnitError):
+        split_quantity(text)
 
 
 def test_a_0_stays_one_however_it_is_written() -> None:

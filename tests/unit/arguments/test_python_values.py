@@ -1,7 +1,10 @@
 """Values that Python programs hand in: masked arrays, times, enumerations, tables, proxies, changed scenarios."""
 
 import enum
+import itertools
+import math
 import tomllib
+from dataclasses import replace
 from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
@@ -10,8 +13,8 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo import ArgumentError
-from ppafo.arguments.values import taken_overrides, taken_text
+from ppafo import ArgumentError, Channel, DataError, ScenarioError
+from ppafo.arguments.values import taken_document, taken_overrides, taken_text
 
 TASK = "torque-task-proportional"
 MASKED = np.ma.array([3.0, 4.0], mask=[True, False])
@@ -63,3 +66,33 @@ def test_a_masked_number_and_a_time_of_numpy_are_no_number(number: Any) -> None:
 )
 def test_a_proxy_and_a_generator_are_overrides_as_a_dictionary_and_a_list_are(overrides: Any) -> None:
     assert ppafo.load_scenario(TASK, overrides) == ppafo.load_scenario(TASK, ["run.duration=1 s"])
+
+
+def test_a_document_that_holds_itself_comes_to_an_end() -> None:
+    endless: dict[str, Any] = document()
+    endless["run"] = endless
+    with pytest.raises(ScenarioError, match="deep"):
+        ppafo.scenario_from_dict(endless)
+    assert taken_document({"x": list(itertools.islice(itertools.repeat(1), 2))}) == {"x": [1, 1]}
+
+
+@pytest.mark.parametrize("version", [True, np.bool_(True), 2, "1"])
+def test_only_1_is_a_version_of_a_layout(version: Any) -> None:
+    with pytest.raises(ScenarioError, match=r"schema_version = .* is not allowed"):
+        ppafo.scenario_from_dict({**document(), "schema_version": version})
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, 0, -1.0, "1 s", None, True, np.ma.masked, np.timedelta64(3)])
+def test_a_number_of_a_changed_scenario_is_checked_as_one_of_a_file(number: Any) -> None:
+    scenario = ppafo.load_scenario(TASK)
+    with pytest.raises(ScenarioError, match=r"run\.duration = .*: must be more than 0 s and at most 1e\+06 s"):
+        ppafo.simulate(replace(scenario, run=replace(scenario.run, duration=number)))
+
+
+def test_a_masked_value_of_a_channel_is_none() -> None:
+    assert np.isnan(Channel(MASKED, "rad").values).tolist() == [True, False]
+    with pytest.raises(DataError, match="channel 'angle' is nan at sample 1"):
+        ppafo.Recording("x", np.array([0.0, 1.0]), {"angle": Channel(MASKED, "rad")})
+    for values in (np.array([1, 2], dtype="m8[s]"), np.array([1j, 2.0]), np.array(["1", "2"]), (x for x in [1.0])):
+        with pytest.raises(DataError, match="the values of a channel must be "):
+            Channel(values, "rad")  # type: ignore[arg-type]

@@ -1,11 +1,13 @@
 """Groups of numbers: each is declared once, a lane knows it, and a run that forgets one is refused in one line."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from ppafo.engine.groups import Role, filled
+from ppafo.engine.groups import Role, check_rows, filled
+from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import is_row
 from ppafo.engine.step.lane import Lane
 from ppafo.errors import ProgramError
@@ -58,3 +60,13 @@ def test_a_number_that_is_forgotten_is_one_line(values: dict[str, object], messa
 def test_numbers_of_all_runs_and_of_each_stand_in_rows_by_name() -> None:
     rows = filled({"mine": Mine, "other": Other}, {"other": Other(2.0), "mine": Mine(np.arange(3.0))}, 3, Role.STATE)  # type: ignore[arg-type]
     assert rows.tolist() == [[0.0, 1.0, 2.0], [2.0, 2.0, 2.0]]
+
+
+def test_a_block_with_a_row_too_few_is_refused_before_it_is_run() -> None:
+    batch = plain_batch("torque-task-proportional")
+    with pytest.raises(
+        ProgramError,
+        match=r"parameters: a block must have \d+ rows, not \d+; rows by group of the program: timing 5, plant ",
+    ):
+        run_batch(replace(batch, parameters=batch.parameters[:-1]))
+    check_rows(1, {"mine": Mine}, Role.STATE)

@@ -5,11 +5,14 @@ from typing import Annotated, Any, NamedTuple
 
 import pytest
 
-from ppafo.engine.linking import link_effects
-from ppafo.engine.source_text import SourceCollector, composed_lines
+from ppafo.engine import linking
+from ppafo.engine.linking import link_effects, link_program
+from ppafo.engine.source_text import Replacements, SourceCollector, composed_lines
 from ppafo.errors import ProgramError
 from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect, effect_problem
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.plan import plan_run
 
 
 def place(amount: float) -> float:
@@ -177,3 +180,17 @@ def test_an_effect_that_cannot_act_says_why(change: dict[str, Any], said: str) -
     problem = effect_problem(replace(FIRST, **change))
     assert said in problem
     assert bool(problem) == bool(said)
+
+
+def sprung(driving: float, way: float, sliding: float, damping: float, angle: float, rate: float) -> float:
+    """Equation (1) with a spring in it."""
+    return driving - way * sliding - damping * rate - 2.0 * (angle - 1.0)
+
+
+def test_a_spring_in_equation_1_is_refused_with_the_place_where_friction_knows_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    program = plan_run(load_scenario("step-response")).program
+    monkeypatch.setattr(linking, "net_torque", sprung)
+    with pytest.raises(ProgramError, match=r"test_links\.py:\d+: sprung subtracts 1 N m at rest, .*load_torque"):
+        link_program(program, Replacements())

@@ -15,6 +15,7 @@ from ppafo.engine.cache.folder import LEFT_OUT_FOR
 from ppafo.engine.cache.tidying import list_left_out, list_programs
 from ppafo.engine.compilers import OFFERED
 from ppafo.engine.loading import BACKEND_VARIABLE, compilers_to_try
+from ppafo.errors import SimulationError
 from ppafo.translation import compiling, native
 from tests.interpreted import load_source
 
@@ -204,3 +205,13 @@ def test_a_law_that_has_no_c_is_run_by_python_with_one_line(caplog: pytest.LogCa
     assert [result_of(source), result_of(source)] == [np.sin(2.0)] * 2
     (said,) = caplog.messages
     assert said.endswith("'math.sin' is not supported: Python runs the model, some hundred times slower than compiled")
+
+
+@on_unix
+def test_a_named_compiler_that_fails_is_an_error_and_no_other_is_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiler_that_fails("gcc", tmp_path / "bin", monkeypatch)
+    monkeypatch.setenv(BACKEND_VARIABLE, "gcc")
+    with pytest.raises(SimulationError, match=r"math\.h.*; PPAFO_BACKEND=python needs no compiler"):
+        load_source(text("x[0, 0] - 2.0"))

@@ -115,6 +115,24 @@ def test_constants_are_written_to_the_last_bit_whatever_stands_around_them(write
     assert type(generated(module.law)(1.0)) is type(value)
 
 
+@pytest.mark.parametrize(
+    ("power", "remedy"),
+    [
+        ("x**2", "write 'x * x'"),
+        ("x**3.0", "write 'x * x * x'"),
+        ("x**SQUARE", "write 'x * x'"),
+        ("x**0.5", "pass base and exponent as parameters"),
+        ("2.0**x", "pass base and exponent as parameters"),
+    ],
+)
+def test_a_power_with_a_number_that_is_written_out_is_refused_with_what_to_write(
+    power: str, remedy: str, write: Write
+) -> None:
+    module = write(f"SQUARE = 2\n\n\ndef law(x):\n    return {power}\n")
+    written = power.replace("**", " ** ")
+    assert refused(module.law) == f"my_law.py:5: '{written}' cannot be compiled; {remedy}"
+
+
 def test_a_module_under_another_name_and_functions_of_math_are_found(write: Write) -> None:
     module = write(
         "import math as m\nfrom math import pi, sqrt\nfrom math import *\n\n\ndef law(x):\n"
@@ -122,6 +140,16 @@ def test_a_module_under_another_name_and_functions_of_math_are_found(write: Writ
     )
     for value in (-0.0, 2.5):
         assert generated(module.law)(value) == module.law(value)
+
+
+def test_a_local_name_that_hides_what_is_needed_is_refused(write: Write) -> None:
+    module = write(
+        "from math import sqrt\n\n\ndef other(x):\n    return x\n\n\n"
+        "def law(x):\n    math = 2.0\n    return sqrt(x) * math\n\n\n"
+        "def second(foreign_my_law_other):\n    return other(foreign_my_law_other)\n"
+    )
+    assert "the local name 'math' hides 'sqrt'" in refused(module.law)
+    assert "hides 'other'" in refused(module.second)
 
 
 def test_a_function_that_hides_a_builtin_one_is_taken(write: Write) -> None:
@@ -182,6 +210,17 @@ def test_a_row_that_cannot_be_changed_so_is_refused(write: Write, old: str, new:
     assert said in refused(write(ROWS.replace(old, new)).law)
 
 
+def test_a_named_tuple_that_does_more_than_hold_numbers_is_refused(write: Write) -> None:
+    module = write(
+        "from typing import NamedTuple\n\n\nclass Vector(NamedTuple):\n    x: float\n\n    def __add__(self, other):\n"
+        "        return Vector(self.x + other.x)\n\n\nclass Base(NamedTuple):\n    x: float\n\n\nclass Doubled(Base):\n"
+        "    def __new__(cls, x):\n        return super().__new__(cls, 2.0 * x)\n\n\ndef law(x):\n"
+        "    return Vector(x) + Vector(x)\n\n\ndef doubled(x):\n    return Doubled(x)\n"
+    )
+    assert "redefines __add__" in refused(module.law)
+    assert "must be a NamedTuple, not a subclass" in refused(module.doubled)
+
+
 def test_attributes_of_classes_are_refused(write: Write) -> None:
     module = write(
         "from typing import NamedTuple\n\n\nclass Row(NamedTuple):\n    a: float\n\n\n"
@@ -190,6 +229,12 @@ def test_attributes_of_classes_are_refused(write: Write) -> None:
     )
     assert refused(module.law).startswith("my_law.py:13: 'Config.gain'")
     assert refused(module.other).startswith("my_law.py:17: 'Row._make")
+
+
+def test_a_file_that_changed_since_it_was_loaded_is_refused(write: Write) -> None:
+    module = write("def law(x):\n    return 2.0 * x\n")
+    Path(module.__file__ or "").write_text("def law(x):\n    return 3.0 * x\n")
+    assert "the file changed after it was loaded" in refused(module.law)
 
 
 def test_functions_that_call_themselves_are_refused(write: Write) -> None:

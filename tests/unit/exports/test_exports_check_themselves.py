@@ -6,9 +6,11 @@ from ppafo.errors import ProgramError
 from ppafo.exports.c_library.files import expected_csv
 from ppafo.exports.fmu import unit
 from ppafo.exports.fmu.interface import closed_loop, plant_alone
+from ppafo.exports.fmu.platforms import host_platform
 from ppafo.exports.fmu.unit import functional_unit
 from ppafo.simulation.loading import load_scenario
 
+pytestmark = pytest.mark.skipif(host_platform() != "linux64", reason="units are run in the tests on linux64 alone")
 SHORT = ("run.duration=0.3 s", "reference.ramp_time=0.1 s")
 
 

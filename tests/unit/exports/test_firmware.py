@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from ppafo.errors import ProgramError
+from ppafo.errors import ProgramError, ScenarioError, SimulationError
 from ppafo.processor.controller import FIXED_LAWS, PythonProcessor, fixed_point_controller
 from ppafo.processor.firmware import declared, firmware, proof
 from ppafo.processor.simulated import (
@@ -24,6 +24,7 @@ from ppafo.processor.torque_laws.law import FixedLaw
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.files import add_files
+from ppafo.translation.compiling import asked
 from ppafo.translation.widths import IntegerRange
 
 SCENARIOS = {
@@ -133,8 +134,33 @@ def test_a_processor_with_other_numbers_is_found_out(monkeypatch: pytest.MonkeyP
     assert "on the processor" in found.first_difference
 
 
+@if_simulated
+def test_a_simulator_that_ends_early_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ppafo.processor.simulated.asked", lambda line, **given: asked([*line[:-1], "exit"], **given))
+    monkeypatch.setattr("ppafo.processor.simulated.build_firmware", lambda _: None)
+    with pytest.raises(SimulationError, match="answered 0 of 5 samples"):
+        try_firmware(scenario_of("pid"), 5)
+
+
 def test_numbers_stand_in_a_header_with_range_and_origin() -> None:
     header = firmware(scenario_of("pid"))["parameters.h"].decode()
     assert "proportional_gain 0.095 1/(N m) (controller.proportional_gain)" in header
     assert "#define CONTROLLER_TICKS 8u" in header
     assert '#error "CONTROLLER_PROPORTIONAL is beyond its range"' in header
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides", "said"),
+    [
+        ("torque-task-proportional", ("effects.opening.command_01=0.1",), "inverts no table of openings"),
+        ("step-response", (), "'constant' has no fixed-point form; available: pid, on_off"),
+        (
+            "torque-task-solenoid",
+            ("controller.rate=900 Hz",),
+            r"must be a multiple of 0.125 ms on the processor, at most 2.05 s",
+        ),
+    ],
+)
+def test_what_has_no_firmware_is_refused(name: str, overrides: tuple[str, ...], said: str) -> None:
+    with pytest.raises(ScenarioError, match=said):
+        firmware(load_scenario(name, overrides))

@@ -17,12 +17,14 @@ import ppafo.cli
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.fmu.interface import FIXED_NAMES, closed_loop
+from ppafo.exports.fmu.platforms import host_platform
 from ppafo.exports.fmu.unit import functional_unit
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from scripts.instances import Instance, growth_of
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed (pip install -e .[dev])")
+pytestmark = pytest.mark.skipif(host_platform() != "linux64", reason="units are run in the tests on linux64 alone")
 SHORT = ("run.duration=0.3 s", "reference.ramp_time=0.1 s")
 
 
@@ -209,8 +211,35 @@ def test_a_tunable_parameter_changes_the_run_from_there_on_and_a_fixed_one_is_re
     plain.close()
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("valve.area", -1.0, "valve.area"),
+        ("valve.delay", 0.01, "valve.delay needs other functions"),
+        ("run.duration", 0.3005, "run.output_interval"),
+        ("gas.temperature", float("nan"), "gas.temperature"),
+    ],
+)
+def test_parameters_that_cannot_be_are_refused_by_name(
+    unit: str, name: str, value: float, said: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(Exception, match="ExitInitializationMode"):
+        Instance(unit, {name: value})
+    assert said in capfd.readouterr().out
+
+
 def test_instances_are_freed_without_growth(unit: str) -> None:
     assert growth_of(unit, 1000, warm=200) < 100_000
+
+
+def test_the_unit_holds_sources_that_build_it_without_a_warning(unit: str, tmp_path: Path) -> None:
+    with zipfile.ZipFile(unit) as archive:
+        archive.extractall(tmp_path)
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-fsyntax-only"]
+    subprocess.run(["gcc", *flags, *map(str, (tmp_path / "sources").glob("fmi?.c"))], check=True)
+    page = (tmp_path / "documentation" / "index.html").read_text()
+    assert "<td>linux64</td><td>run in the tests</td>" in page
+    assert "@" not in page
 
 
 def test_no_name_of_a_scenario_meets_another_name_of_its_unit(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError
+from ppafo.gait import at_speed, load_gait, walk_recording
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.signals.recording import Floats
 
@@ -39,3 +40,15 @@ def test_the_ankle_of_the_other_foot_is_refused_as_such_and_not_as_a_wrong_zero(
         DataError, match=r"ankle_angle is shifted by 50 % of the stride against shank_angle, so it belongs"
     ):
         remarks_of(other)
+
+
+@pytest.mark.parametrize("speed", [1.07, 1.2, 1.46, 1.59])
+def test_the_built_in_gait_at_other_speeds_has_no_remark(
+    csv_of: Callable[..., Path], remarks_of: Callable[..., tuple[str, ...]], speed: float
+) -> None:
+    walk = walk_recording(at_speed(load_gait(), speed), 4)
+    given = {f"{name} [{walk.unit(name)}]": np.array(walk[name]) for name in ("shank_angle", "ankle_angle")}
+    given |= {MOMENT: np.array(walk["ankle_moment"]), FORCE: np.array(walk["vertical_force"])}
+    # The recording has no column of the knee, and nothing else is odd about it.
+    (remark,) = import_gait([csv_of(given, walk.time)], ImportSettings(62.0)).remarks
+    assert remark.startswith("no acceleration of the knee: ")

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError
+from ppafo.gait.plausible import stride_remarks
 from ppafo.gait.recorded import ImportSettings, import_gait
+from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 
 Change = Callable[[dict[str, Floats]], dict[str, Floats]]
@@ -155,9 +157,106 @@ def test_a_stumble_is_left_out_and_named(
     assert all(line.endswith("left out: ankle_angle differs from all other strides") for line in remarks)
 
 
+@pytest.mark.parametrize(("column", "value", "start", "samples"), [(ANKLE, 1.57, 755, 18), (MOMENT, 0.0, 730, 50)])
+def test_a_short_drop_out_in_one_stride_is_no_part_of_the_mean(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], column: str, value: float, start: int, samples: int
+) -> None:
+    """90 ms at toe-off, or a push-off that was lost: little of the stride, but far from all others there."""
+    damaged = np.array(columns[column])
+    damaged[start : start + samples] = value + 1e-4 * np.arange(samples)
+    found = import_gait([csv_of({**columns, column: damaged})], ImportSettings(62.0))
+    assert found.gait.strides == 4
+    assert any("differs from all other strides" in line for line in found.remarks)
+
+
+def test_a_reversed_shank_without_a_force_is_named_as_what_it_is(
+    csv_of: Callable[..., Path], columns: dict[str, Floats]
+) -> None:
+    reversed_shank = changed(SHANK, np.negative)({name: x for name, x in columns.items() if name != FORCE})
+    with pytest.raises(DataError, match=r"on the ground for 17.8 % of the stride, by shank_angle \(plausible"):
+        import_gait([csv_of(reversed_shank)], ImportSettings(62.0))
+
+
+@pytest.mark.parametrize(("factor", "shown"), [(0.6, "0.278"), (0.9, "0.417"), (1.3, "0.602")])
+def test_a_force_that_is_not_half_the_weight_is_remarked(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], factor: float, shown: str
+) -> None:
+    (remark,) = import_gait([csv_of(scaled((FORCE,), factor)(columns))], ImportSettings(62.0)).remarks
+    assert remark.startswith(f"vertical_force has a mean of {shown} body weights, but each leg of a steady walk")
+    # One file need not be a list of one.
+    assert import_gait(str(csv_of(columns)), ImportSettings(62.0)).remarks == ()
+
+
 def test_a_gap_in_a_table_with_the_names_of_the_package_is_filled(
     csv_of: Callable[..., Path], columns: dict[str, Floats]
 ) -> None:
     columns[ANKLE][500:508] = np.nan
     lost, filled = (import_gait([csv_of(columns)], ImportSettings(62.0, longest_gap=gap)) for gap in (0.0, 0.1))
     assert (lost.gait.strides, filled.gait.strides) == (4, 5)
+
+
+def test_a_time_in_milliseconds_is_refused(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording
+) -> None:
+    with pytest.raises(DataError, match=r"the stride time is 1040 s \(plausible: 0.5 to 3\)"):
+        import_gait([csv_of(columns, 1000.0 * walk.time)], ImportSettings(62.0))
+
+
+def test_a_column_in_two_files_is_refused(opensim_files: dict[str, Path], tmp_path: Path) -> None:
+    twin = tmp_path / "twin.mot"
+    twin.write_text(opensim_files["grf"].read_text())
+    with pytest.raises(DataError, match=r"vertical_force: .* both have the column 'ground_force_vy'"):
+        import_gait([*opensim_files.values(), twin], ImportSettings(62.0))
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        ImportSettings(62000.0),
+        ImportSettings(float("nan")),
+        ImportSettings(62.0, walking_speed=50.0),
+        ImportSettings(62.0, stature=175.0),
+        ImportSettings(62.0, low_pass=0.1),
+        ImportSettings(62.0, low_pass=500.0),
+        ImportSettings(62.0, least_strides=0),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], settings: ImportSettings
+) -> None:
+    with pytest.raises(DataError, match=r"is not plausible|samples per second|must be 1 or more"):
+        import_gait([csv_of(columns)], settings)
+
+
+def test_a_hip_below_the_ground_is_a_sign_and_no_unit(opensim_files: dict[str, Path]) -> None:
+    top, _, body = opensim_files["ik"].read_text().partition("endheader\n")
+    labels, *lines = body.splitlines()
+    place = labels.split("\t").index("pelvis_ty")
+    cells = [line.split("\t") for line in lines]
+    for row in cells:
+        row[place] = repr(-float(row[place]))
+    table = "\n".join([labels, *("\t".join(row) for row in cells)])
+    opensim_files["ik"].write_text(f"{top}endheader\n{table}\n")
+    with pytest.raises(DataError) as caught:
+        import_gait(list(opensim_files.values()), ImportSettings(62.0, stature=1.63))
+    assert re.search(r"the hip is -0\.87 m high \(pelvis_ty\): the sign of knee\.up is reversed", str(caught.value))
+
+
+def test_a_moment_that_hardly_shows_its_sign_is_remarked() -> None:
+    curve = np.sin(np.linspace(0.0, 2.0 * np.pi, 101))
+    still = {"shank_angle": np.zeros(101), "ankle_angle": np.full(101, 0.5 * np.pi)}
+    assert stride_remarks({**still, "ankle_moment": np.maximum(curve, -0.1)}) == []
+    (said,) = stride_remarks({**still, "ankle_moment": np.maximum(curve, -0.8)})
+    assert "1 N m/kg in plantarflexion and 0.8 N m/kg in dorsiflexion" in said
+
+
+def test_a_walker_who_turns_within_the_record_is_remarked(opensim_files: dict[str, Path]) -> None:
+    top, _, body = opensim_files["ik"].read_text().partition("endheader\n")
+    labels, *lines = body.splitlines()
+    for degrees, is_said in ((30.0, False), (80.0, True)):
+        turned = np.linspace(-0.5 * degrees, 0.5 * degrees, len(lines))
+        rows = [f"{line}\t{angle!r}\t0.0" for line, angle in zip(lines, turned.tolist(), strict=True)]
+        table = "\n".join([f"{labels}\tpelvis_rotation\tpelvis_tz", *rows])
+        opensim_files["ik"].write_text(f"{top}endheader\n{table}\n")
+        found = import_gait(list(opensim_files.values()), ImportSettings(62.0))
+        assert any("the walker turns by 80 deg (pelvis_rotation)" in line for line in found.remarks) is is_said

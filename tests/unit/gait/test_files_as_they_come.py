@@ -18,7 +18,7 @@ from ppafo.gait.recorded.source import read_table
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
 from ppafo.storage.opensim import opensim_recording, write_opensim
-from tests.unit.gait.laboratory import GAIT, MASS, STRIDE, UNLOADED, angles, curve, force, opensim
+from tests.unit.gait.laboratory import GAIT, MASS, STRIDE, UNLOADED, angles, curve, force, markers, opensim, trc
 
 PHASES = np.linspace(0.0, 1.0, 101)
 TIME, FAST = np.arange(0.0, 5.2, 0.01), np.arange(0.0, 5.2, 0.002)
@@ -84,6 +84,16 @@ def test_one_contact_in_a_long_record_of_a_plate_is_a_force() -> None:
         check_force_scale("plate", 10.0 * weights)
 
 
+def test_a_wrong_count_of_columns_and_repeated_last_times_are_mended_and_said(tmp_path: Path) -> None:
+    path = opensim(tmp_path / "ik.mot", TIME, angles(TIME), "inDegrees=yes", width=9)
+    text = path.read_text().replace(f"nRows={TIME.size}", f"nRows={TIME.size + 2}")
+    path.write_text(text + 2 * (text.splitlines()[-1] + "\n"))
+    found = import_gait([path], PERSON)
+    assert_true(found.gait, ("shank_angle", "ankle_angle"))
+    assert "ik.mot: the header states 9 columns, but labels and rows have 5, which were read" in found.remarks
+    assert "ik.mot: 2 of the last rows repeat the time 5.19 s and were dropped" in found.remarks
+
+
 def test_one_cycle_that_wraps_around_is_a_stride(tmp_path: Path) -> None:
     for start in (0.15, 0.4, 0.9):
         time = start + np.arange(0.0, 1.35 / 1.15 * STRIDE, 0.01)
@@ -110,6 +120,71 @@ def test_a_cycle_whose_ends_are_not_the_same_motion_is_not_wrapped() -> None:
     assert wrap_cycle(drifting) is None
     short = np.arange(0.4, 0.4 + 0.9 * STRIDE, 0.01)
     assert wrap_cycle({name: Signal("file", short, curve(name, short)) for name in walk}) is None
+
+
+def walked(tmp_path: Path, gap: tuple[int, int] = (0, 0), up: int = 1) -> Path:
+    points = markers(TIME[:400], up=up)
+    points["RKNE"][:, gap[0] : gap[1]] = np.nan
+    return trc(tmp_path / "walk.trc", TIME[:400], points)
+
+
+@pytest.mark.parametrize("up", [1, 2])
+def test_markers_give_shank_knee_and_an_ankle_whose_zero_is_the_flat_foot(tmp_path: Path, up: int) -> None:
+    plates = opensim(tmp_path / "grf.mot", FAST, {"1_ground_force_vy": force(FAST, "right", [1])})
+    found = import_gait([walked(tmp_path, up=up), plates], PERSON)
+    assert_true(found.gait, ("shank_angle", "vertical_force"))
+    assert error(found.gait, "knee_forward") < 0.5
+    turned = [
+        float(np.ptp(found.gait.ankle_angle.values_at(PHASES) - GAIT.ankle_angle.values_at(PHASES + shift)))
+        for shift in np.linspace(-0.03, 0.03, 61)
+    ]
+    assert min(turned) < 0.02, "but for the zero it is the same curve"
+    assert "ankle angle from the markers RHEE and RTOE; zero from the flat foot" in found.remarks
+    assert not any("zero of ankle_angle" in line for line in found.remarks)
+
+
+def test_gaps_are_filled_up_to_the_length_that_is_stated_and_named(tmp_path: Path) -> None:
+    path = walked(tmp_path, (120, 126))
+    with pytest.raises(DataError, match="has 1 whole stride covered"):
+        import_gait([path], ImportSettings(MASS, longest_gap=0.05))
+    assert len(import_gait([path], ImportSettings(MASS, least_strides=1)).strides) == 1
+    found = import_gait([path], ImportSettings(MASS, longest_gap=0.07))
+    assert_true(found.gait, ("shank_angle",))
+    assert "walk.trc: column 'RKNE.x': 6 samples from 1.2 to 1.25 s filled" in found.remarks
+    with pytest.raises(DataError, match=r"longest gap 0.4 s is not plausible; allowed is 0 to 0.25 s"):
+        import_gait([path], ImportSettings(MASS, longest_gap=0.4))
+
+
+def test_rows_that_are_missing_are_bridged_up_to_the_same_length(tmp_path: Path) -> None:
+    kept = np.delete(TIME, slice(200, 206))
+    path = opensim(tmp_path / "ik.mot", kept, angles(kept), "inDegrees=yes")
+    left = import_gait([path], ImportSettings(MASS, least_strides=1))
+    assert all(stride.end < 1.99 or stride.start > 2.06 for stride in left.strides)
+    found = import_gait([path], ImportSettings(MASS, longest_gap=0.08))
+    assert_true(found.gait, ("shank_angle", "ankle_angle"))
+    assert "ik.mot: rows from 1.99 to 2.06 s are missing and were bridged" in found.remarks
+
+
+def test_start_and_end_leave_out_the_rest(tmp_path: Path) -> None:
+    path = opensim(tmp_path / "ik.mot", TIME, angles(TIME), "inDegrees=yes")
+    assert len(import_gait([path], PERSON).strides) == 3
+    strides = import_gait([path], ImportSettings(MASS, start=1.2, end=4.5)).strides
+    assert len(strides) == 2
+    assert all(item.start >= 1.2 and item.end <= 4.5 for item in strides)
+    for start, end in ((7.0, None), (3.0, 2.0)):
+        with pytest.raises(DataError, match=r"leaves none of its samples|must be before the end"):
+            import_gait([path], ImportSettings(MASS, start=start, end=end))
+
+
+def test_the_reading_of_a_neutral_ankle_may_be_given(tmp_path: Path) -> None:
+    columns = angles(TIME)
+    columns["ankle_angle_r"] = columns["ankle_angle_r"] - 8.0
+    path = opensim(tmp_path / "ik.mot", TIME, columns, "inDegrees=yes")
+    (said,) = [line for line in import_gait([path], PERSON).remarks if "zero of ankle_angle" in line]
+    assert "tilted by 12." in said
+    found = import_gait([path], ImportSettings(MASS, ankle_neutral=np.radians(-8.0)))
+    assert_true(found.gait, ("ankle_angle",))
+    assert not any("zero of ankle_angle" in line for line in found.remarks)
 
 
 @pytest.mark.parametrize("side", ["right", "left"])

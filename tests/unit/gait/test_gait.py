@@ -15,8 +15,11 @@ import pytest
 from ppafo.errors import DataError
 from ppafo.gait import Gait, at_speed, list_gaits, load_gait, speed_range, walk_recording
 from ppafo.gait.document import gait_toml, json_schema, parse_gait
+from ppafo.gait.finding import gait_finding
 from ppafo.gait.gait import KNEE, GaitCurve
 from ppafo.gait.plausible import gait_file_remarks
+from ppafo.gait.recorded import ImportedGait, ImportSettings, import_gait
+from ppafo.storage import write_csv
 
 ROOT = Path(__file__).parents[3]
 PHASES = np.linspace(0.0, 1.0, 201)
@@ -74,6 +77,12 @@ def test_the_shipped_gaits_fit_the_published_schema() -> None:
         assert not list(validator.iter_errors(tomllib.loads(text)))
 
 
+def test_a_gait_file_that_no_leg_walks_is_refused(normative: Gait) -> None:
+    ankle = dataclasses.replace(normative.ankle_angle.scale(-1.0), mean=math.pi - normative.ankle_angle.mean)
+    with pytest.raises(DataError, match=r"^bad.toml: .*the sign is reversed"):
+        parse_gait(gait_toml(dataclasses.replace(normative, ankle_angle=ankle)).encode(), "bad.toml")
+
+
 def test_a_gait_file_needs_no_knee_but_not_half_of_one(normative: Gait) -> None:
     half = dataclasses.replace(normative, knee_up=None)
     with pytest.raises(DataError, match=r"half.toml: knee_forward needs knee_up; give both or neither"):
@@ -104,6 +113,23 @@ def test_the_way_of_the_knee_stays_when_the_speed_changes(normative: Gait) -> No
         np.testing.assert_allclose(ways[1], ways[0], rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.parametrize("speed", [1.0, 1.7, float("nan")])
+def test_a_speed_outside_the_range_is_refused_with_the_range(normative: Gait, speed: float) -> None:
+    with pytest.raises(DataError, match=r"can be scaled to speeds of 1.06 to 1.6 m/s, not to"):
+        at_speed(normative, speed)
+
+
+@pytest.mark.parametrize("change", [{"body_mass": 0.0}, {"stride_time": float("nan")}, {"stance_share": 1.0}])
+def test_numbers_that_no_gait_has_are_refused(normative: Gait, change: dict[str, float]) -> None:
+    with pytest.raises(DataError, match="gait 'falisse2019-subject1': body mass"):
+        dataclasses.replace(normative, **change)  # type: ignore[arg-type]
+
+
+def test_a_gait_without_a_speed_cannot_be_scaled(normative: Gait) -> None:
+    with pytest.raises(DataError, match="has no walking speed"):
+        at_speed(dataclasses.replace(normative, walking_speed=None), 1.2)
+
+
 def test_a_gait_that_is_recorded_below_the_limit_of_the_walk_ratio_is_not_slowed_down(normative: Gait) -> None:
     slow = dataclasses.replace(normative, walking_speed=0.9)
     assert speed_range(slow)[0] == 0.9
@@ -124,6 +150,30 @@ def test_the_built_in_gait_is_what_the_script_makes_of_the_data(shared_data: Pat
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     shipped = ROOT / "src" / "ppafo" / "gait" / "normative" / "falisse2019-subject1.toml"
     assert done.stdout == shipped.read_text(encoding="utf-8")
+
+
+LARGEST_FIT_ERRORS = {
+    "shank_angle": ("phi_deg", 0.26),
+    "ankle_angle": ("ankle_deg", 0.16),
+    "ankle_moment": ("ankle_moment_Nm_kg", 0.0035),
+    "vertical_force": ("vGRF_BW", 0.028),
+}
+
+
+@pytest.mark.parametrize("name", LARGEST_FIT_ERRORS)
+def test_the_series_stay_as_near_to_the_data_as_the_notes_say(normative: Gait, shared_data: Path, name: str) -> None:
+    table = np.genfromtxt(
+        shared_data / "gait" / "falisse2019_derived" / "falisse2019_s1_1p33_stride.csv", delimiter=",", names=True
+    )
+    column, largest = LARGEST_FIT_ERRORS[name]
+    series = normative.curves[name].values_at(table["pct"] / 100.0)
+    if name == "ankle_angle":
+        series = 0.5 * np.pi - series
+    if name.endswith("_angle"):
+        series = np.degrees(series)
+    left = np.abs(series - table[column])
+    assert left.max() < largest
+    assert left.mean() < 0.2 * table[f"{column}_sd"].mean(), "far below what strides differ by"
 
 
 def test_the_rate_of_the_shank_is_the_recorded_one(normative: Gait, shared_data: Path) -> None:
@@ -154,3 +204,36 @@ def test_an_ankle_zero_that_is_off_is_remarked(tilt: float, remarked: str) -> No
     remarks = gait_file_remarks(parse_gait(gait_toml(moved).encode(), "moved.toml"))
     assert bool(remarks) == bool(remarked)
     assert all(remarked in line for line in remarks)
+
+
+@pytest.mark.parametrize("tilt", [17.0, -26.0])
+def test_an_ankle_zero_that_no_standing_foot_has_is_refused(tilt: float) -> None:
+    gait = load_gait()
+    moved = replace(gait, ankle_angle=replace(gait.ankle_angle, mean=gait.ankle_angle.mean + math.radians(tilt)))
+    with pytest.raises(
+        DataError, match=r"implies a foot tilted by -?2\d deg in mid-stance \(plausible: up to 20 deg\)"
+    ):
+        parse_gait(gait_toml(moved).encode(), "moved.toml")
+
+
+def test_a_stature_is_written_and_read_and_its_limits_are_said() -> None:
+    text = gait_toml(replace(load_gait(), stature=1.71))
+    assert parse_gait(text.encode(), "tall.toml").stature == 1.71
+    with pytest.raises(DataError, match=r"subject.stature = '171 m': must be at least 0.5 m and at most 2.5 m"):
+        parse_gait(text.replace("1.71 m", "171 m").encode(), "tall.toml")
+
+
+@pytest.fixture
+def imported(tmp_path: Path) -> ImportedGait:
+    path = write_csv(tmp_path / "walk.csv", walk_recording(load_gait(), 5))
+    return import_gait([path], ImportSettings(62.0))
+
+
+def test_the_ankle_angle_is_drawn_from_neutral_with_dorsiflexion_positive(imported: ImportedGait) -> None:
+    gait = load_gait()
+    flexion = 90.0 - np.degrees(gait.ankle_angle.values_at([0.45, 0.67]))
+    assert flexion[0] > 10.0, "the shank leans forward over the foot before push-off"
+    assert flexion[1] < -10.0, "the toes point down after push-off"
+    np.testing.assert_allclose(gait_finding(gait).plot().axes[1].lines[-1].get_ydata()[[45, 67]], flexion)
+    drawn = gait_finding(imported.gait, imported).plot().axes[1].lines
+    np.testing.assert_allclose(drawn[2].get_ydata(), 90.0 - np.degrees(imported.curves["ankle_angle"].curves[0]))

@@ -1,6 +1,7 @@
 """Recorded files become the gait that is in them, whatever their form, unit and sign."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from ppafo.errors import DataError
 from ppafo.gait import Gait, walk_recording
-from ppafo.gait.document import gait_toml
+from ppafo.gait.document import gait_toml, parse_gait
 from ppafo.gait.finding import gait_finding
 from ppafo.gait.gait import KNEE
 from ppafo.gait.recorded import ImportSettings, import_gait
@@ -17,9 +18,12 @@ from ppafo.gait.recorded.mapping import (
     AngleMap,
     ForceMap,
     GaitMap,
+    KneeMap,
     MomentMap,
     PressureMap,
     ShankMap,
+    Side,
+    package_map,
 )
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
@@ -107,6 +111,35 @@ def test_opensim_tables_of_one_walk(opensim_files: dict[str, Path], normative: G
     assert str(gait_finding(found.gait, found)).splitlines()[0].endswith("(imported)")
 
 
+@pytest.mark.parametrize("how", ["acceleration", "position", "backwards", "hip and thigh"])
+def test_the_knee_is_read_as_acceleration_as_position_or_from_the_hip(
+    csv_of: Callable[..., Path],
+    columns: dict[str, Floats],
+    walk: Recording,
+    knee_way: Callable[[Floats], tuple[Floats, Floats]],
+    normative: Gait,
+    how: str,
+) -> None:
+    forward, up = knee_way(walk.time)
+    rest = {name: values for name, values in columns.items() if not name.startswith("knee_")}
+    lean = 0.3 * np.cos(6.0 * walk.time)
+    hip = {"hip_x [m]": forward - 0.4 * np.sin(lean), "hip_y [m]": up + 0.4 * np.cos(lean), "thigh [rad]": lean}
+    files, knee = {
+        "acceleration": (columns, package_map().knee),
+        "position": (rest | {"knee_forward [mm]": 1000.0 * forward, "knee_up [m]": up}, package_map().knee),
+        "backwards": (rest | {"back [m]": -forward, "up [m]": up}, KneeMap(forward=("-back",), up=("up",))),
+        "hip and thigh": (
+            rest | hip,
+            KneeMap(forward=("hip_x",), up=("hip_y",), thigh=("thigh",), thigh_length="40 cm"),
+        ),
+    }[how]
+    columns_map = replace(package_map(), knee=knee, centre_of_pressure=None)
+    found = import_gait([csv_of(files)], ImportSettings(62.0, columns=columns_map)).gait
+    for name in KNEE:
+        assert largest_difference(found, normative, name) < KNEE_LIMIT
+        assert found.curve(name).deviation < KNEE_LIMIT, "all strides are alike"
+
+
 @pytest.mark.parametrize("facing", [30.0, 90.0, 180.0, -120.0])
 def test_a_walk_in_any_direction_is_that_along_x(
     opensim_files: dict[str, Path], normative: Gait, facing: float
@@ -128,6 +161,33 @@ def test_a_walk_in_any_direction_is_that_along_x(
     assert max(largest_difference(found.gait, normative, name) for name in KNEE) < KNEE_LIMIT
     assert largest_difference(found.gait, normative, "shank_angle") < 0.01
     assert any("to the left of x (pelvis_rotation)" in remark for remark in found.remarks)
+
+
+def test_a_hip_that_does_not_move_is_refused(opensim_files: dict[str, Path]) -> None:
+    path = opensim_files["ik"]
+    head, rows = path.read_text().split("time\t")
+    labels, *lines = rows.splitlines()
+    fixed = ["\t".join([*line.split("\t")[:5], "0.0", "0.9"]) for line in lines]
+    path.write_text("\n".join([f"{head}time\t{labels}", *fixed, ""]))
+    with pytest.raises(DataError, match=r"the hip does not move \(pelvis_tx is constant\)"):
+        import_gait(list(opensim_files.values()), ImportSettings(62.0, stature=1.7))
+
+
+def test_a_knee_that_is_carried_backwards_is_refused(
+    csv_of: Callable[..., Path],
+    columns: dict[str, Floats],
+    walk: Recording,
+    knee_way: Callable[[Floats], tuple[Floats, Floats]],
+) -> None:
+    forward, up = knee_way(walk.time)
+    rest = {name: values for name, values in columns.items() if not name.startswith("knee_")}
+    path = csv_of(rest | {"knee_forward [m]": forward - 2.6 * walk.time, "knee_up [m]": up})
+    with pytest.raises(
+        DataError,
+        match=r"moves backwards at 1.3 m/s, so knee.forward points against the "
+        "walking direction",
+    ):
+        import_gait([path], ImportSettings(62.0))
 
 
 def test_without_a_force_the_strides_come_from_the_shank(opensim_files: dict[str, Path], normative: Gait) -> None:
@@ -190,6 +250,21 @@ def test_strides_differ_as_much_as_they_were_made_to(csv_of: Callable[..., Path]
 
 def _starts(one: Recording, lengths: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum(lengths * one.duration)[:-1]])
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_a_real_knee_taken_for_numbers_in_g_or_exchanged_is_refused(shared_data: Path, side: Side) -> None:
+    folder = shared_data / "gait" / "opensim_subject01"
+    files = [folder / "subject01_walk1_ik.mot", folder / "subject01_walk1_grf_15s.mot"]
+    gait = import_gait(files, ImportSettings(72.6, side, stature=1.8034)).gait
+    assert gait.knee_forward is not None
+    assert gait.knee_up is not None
+    in_g = {name: gait.curve(name).scale(1.0 / 9.80665) for name in KNEE}
+    with pytest.raises(DataError, match=r"multiply both by 9\.80665"):
+        parse_gait(gait_toml(replace(gait, **in_g)).encode(), "g.toml")
+    other = replace(gait, knee_forward=gait.knee_up, knee_up=gait.knee_forward)
+    with pytest.raises(DataError, match="the foot is flat; exchange them"):
+        parse_gait(gait_toml(other).encode(), "other.toml")
 
 
 def test_real_treadmill_walking_from_opensim(shared_data: Path) -> None:

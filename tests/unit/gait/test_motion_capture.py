@@ -6,10 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ppafo.errors import DataError
 from ppafo.gait.recorded import ImportSettings, import_gait
+from ppafo.gait.recorded.mapping import load_map
 from ppafo.gait.recorded.source import form_of, read_table
 from ppafo.signals.recording import Floats
-from tests.unit.gait.laboratory import MASS, STRIDE, markers
+from tests.unit.gait.laboratory import MASS, STRIDE, markers, trc
 
 TIME = np.arange(0.0, 5.2, 0.01)
 POINTS = {name: point[:, : TIME.size] for name, point in markers(TIME).items()}
@@ -142,3 +144,22 @@ def test_a_marker_that_is_held_until_it_jumps_was_lost_and_one_at_rest_was_not(
     assert any(said in remark and "position unchanged" in remark for remark in found.remarks)
     whole = import_gait([dflow(tmp_path / "whole.txt")], ImportSettings(MASS))
     assert not any("lost" in remark for remark in whole.remarks)
+
+
+@pytest.mark.parametrize(
+    ("forward", "vertical", "said"),
+    [
+        ("y", "z", "shank_angle has a range of 0 deg in the whole recording"),
+        ("-x", "z", "shank_angle.forward = '-x' is reversed: 'RTOE' is behind 'RHEE' along it; the axis is 'x'"),
+        ("x", "y", "is no shank upright along it"),
+    ],
+)
+def test_a_wrong_axis_of_a_map_is_named_before_any_sign(forward: str, vertical: str, said: str, tmp_path: Path) -> None:
+    path, axes = trc(tmp_path / "walk.trc", TIME, POINTS), f'forward = "{forward}"\nvertical = "{vertical}"'
+    (tmp_path / "map.toml").write_text(
+        f'schema_version = 1\n[shank_angle]\nknee = "RKNE"\nankle = "RANK"\n{axes}\n'
+        f'[ankle_angle]\nheel = "RHEE"\ntoe = "RTOE"\npositive = "dorsiflexion"\n{axes}\n'
+    )
+    with pytest.raises(DataError, match=said) as refused:
+        import_gait([path], ImportSettings(MASS, columns=load_map(tmp_path / "map.toml")))
+    assert not refused.value.parts

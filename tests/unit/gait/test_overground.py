@@ -179,6 +179,35 @@ def test_a_single_stride_past_a_plate_is_a_gait_unless_more_are_asked_for(trial:
         import_gait([path], ImportSettings(least_strides=2))
 
 
+def test_another_body_mass_than_the_files_is_taken_and_said(trial: Trial) -> None:
+    found = import_gait([trial()], ImportSettings(70.0))
+    assert found.gait.body_mass == 70.0
+    assert "body mass 70 kg as given; trial.c3d states 62 kg" in found.remarks
+
+
+def test_a_walk_across_the_axes_is_refused(trial: Trial) -> None:
+    def turned(points: dict[str, Floats]) -> None:
+        for name in ("RKNE", "RANK"):
+            points[name] = np.array([points[name][0], points[name][0], points[name][2]])
+
+    with pytest.raises(DataError, match=r"walking direction is 45 deg off axis x"):
+        import_gait([trial(change=turned)], ImportSettings())
+
+
+def test_nonsense_in_subject_and_events_is_as_if_it_were_absent(trial: Trial) -> None:
+    import ezc3d
+
+    path = trial()
+    file = ezc3d.c3d(str(path))
+    file.add_parameter("PROCESSING", "Bodymass", [-1.0])
+    file.add_parameter("EVENT", "TIMES", [1.0, 2.0, 3.0])
+    file.write(str(path))
+    found = read_table(path)
+    assert (found.body_mass, found.events) == (None, {})
+    (said,) = (line for line in found.remarks if "events" in line)
+    assert "labels and 3 times, but needs the same number of each" in said
+
+
 @pytest.mark.parametrize(
     ("flat", "said"),
     [(lambda times: times[1], "a flat list of seconds"), (lambda times: times.T.ravel(), "a flat list of minutes and")],

@@ -44,6 +44,11 @@ def changed(source: RecordingSource, name: str, values: np.ndarray) -> Recording
     return RecordingSource(source.recording.with_channel(name, values, source.recording.unit(name)), source.reference)
 
 
+def retimed(source: RecordingSource, time: np.ndarray) -> RecordingSource:
+    recording = source.recording
+    return RecordingSource(Recording(recording.label, time, recording.channels, recording.kind), source.reference)
+
+
 def refusal(solve: Solve, source: RecordingSource) -> str:
     with pytest.raises(IdentificationError) as caught:
         solve(source)
@@ -121,13 +126,57 @@ def test_a_saturated_sensor_is_refused_with_its_sample(
     assert "saturated" in text
 
 
+@pytest.mark.parametrize("kind", ["free-decay", "vane-leak"])
+def test_a_gap_in_a_decay_is_refused_with_its_sample(
+    bench: dict[str, tuple[RecordingSource, Solve]], kind: str
+) -> None:
+    source, solve = bench[kind]
+    time = source.recording.time.copy()
+    time[200:] += 3.0
+    assert "gap of 3.0" in refusal(solve, retimed(source, time))
+    assert "(sample 200)" in refusal(solve, retimed(source, time))
+
+
+def test_a_saturated_flow_meter_is_told_and_a_valve_that_is_open_is_not(
+    bench: dict[str, tuple[RecordingSource, Solve]],
+) -> None:
+    source, solve = bench["valve-map"]
+    flow = source.recording["mass_flow"]
+    clipped = solve(changed(source, "mass_flow", np.minimum(flow, 0.6 * flow.max())))
+    assert any("'mass_flow' stays at" in remark and "from sample" in remark for remark in clipped.remarks)
+    assert not any("'mass_flow'" in remark for remark in solve(source).remarks)
+
+
 def test_noise_alone_is_no_decay(bench: dict[str, tuple[RecordingSource, Solve]]) -> None:
     source, solve = bench["free-decay"]
     noise = np.random.default_rng(3).normal(0.0, 2e-3, len(source.recording))
     assert "no motion" in refusal(solve, changed(source, "angle", noise))
 
 
+def test_a_vane_that_runs_into_a_stop_is_not_taken_for_one_that_comes_to_rest(
+    bench: dict[str, tuple[RecordingSource, Solve]],
+) -> None:
+    _, solve = bench["free-decay"]
+    smooth = planted.decay(noise=0.0)
+    angle = smooth.recording["angle"]
+    stopped = changed(smooth, "angle", np.minimum(angle, angle.min() + 0.7 * np.ptp(angle)))
+    assert "or at a stop" in refusal(solve, stopped)
+    rests = planted.decay(noise=0.0, deceleration=0.8)
+    assert solve(rests).estimates
+
+
 def test_steps_of_a_coarse_converter_are_no_saturation(bench: dict[str, tuple[RecordingSource, Solve]]) -> None:
     source, solve = bench["vane-leak"]
     coarse = changed(source, "pressure_1", np.round(source.recording["pressure_1"], -4))
     assert solve(coarse).estimates
+
+
+@pytest.mark.parametrize("kind", NEEDED)
+def test_a_number_that_no_sensor_shows_is_refused_with_its_sample(
+    bench: dict[str, tuple[RecordingSource, Solve]], kind: str
+) -> None:
+    source, solve = bench[kind]
+    name = NEEDED[kind][0]
+    values = source.recording[name].copy()
+    values[6] = 1e300
+    assert f"'{name}' is 1e+300 at sample 7" in refusal(solve, changed(source, name, values))

@@ -274,3 +274,12 @@ def test_a_search_that_ends_where_no_run_succeeds_has_not_converged_and_names_th
     assert bounded.has_converged
     assert not bounded.edge
     assert bounded.by_name["rate"] == pytest.approx(0.9 * side, rel=1e-6)
+
+
+def test_a_number_beside_whose_start_no_run_succeeds_is_refused_by_name() -> None:
+    def residuals(points: Floats) -> Floats:
+        return np.asarray(np.where(points[1] == 1.0, _TIME[:, None] * points[0] + points[1], np.nan))
+
+    numbers = (FitNumber("slope", 1.0, 0.0, 9.0, 1.0), FitNumber("level", 1.0, 0.0, 9.0, 1.0))
+    with pytest.raises(IdentificationError, match=r"^level: every run fails near 1$"):
+        fit(residuals, numbers, (ResidualBlock("line", "only", slice(0, _COUNT)),))

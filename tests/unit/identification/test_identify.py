@@ -106,6 +106,14 @@ def test_drop_outs_within_a_decay_are_left_out_before_the_push_is_looked_for(ben
         assert estimate.verdict == "identified"
 
 
+def test_a_discharge_coefficient_above_one_is_doubted(bench: Path, solved: Solve) -> None:
+    one = planted.flow().recording
+    write_csv(bench / "minutes.csv", one.with_channel("mass_flow", 60.0 * one["mass_flow"], "kg/s"))
+    result = solved(FLOW.replace("flow.csv", "minutes.csv")).results[0]
+    assert result.remarks[0].startswith("Cd = ")
+    assert result.estimates[0].verdict == "holds for this model only"
+
+
 def test_readings_before_the_air_is_on_are_left_out_and_no_swapped_columns(bench: Path, solved: Solve) -> None:
     one, right = planted.flow().recording, solved(FLOW).results[0].estimates[0].value
     channels = {}
@@ -189,6 +197,14 @@ def test_friction_that_grows_is_written_with_its_growth(solved: Solve) -> None:
     assert outcome.new_set.problem == ""
 
 
+@pytest.mark.parametrize("name", ["decay.csv", "copy.csv"])
+def test_the_same_recording_twice_is_refused_by_the_hash_of_its_numbers(solved: Solve, bench: Path, name: str) -> None:
+    (bench / "copy.csv").write_text("# a copy\n" + (bench / "decay.csv").read_text())
+    for text in (DECAY.replace('"decay.csv"', f'"decay.csv", "{name}"'), DECAY + DECAY.replace("decay.csv", name)):
+        with pytest.raises(PpafoError, match=r"problem\.toml: .* are the same recording"):
+            solved(text)
+
+
 def test_two_procedures_that_find_one_number_agree_or_contradict_each_other(solved: Solve, bench: Path) -> None:
     # Two parts of one recording are not the same samples twice.
     outcome = solved(f'{DECAY}start = "1.1 s"\nend = "3 s"\n{DECAY}start = "3.5 s"\nend = "6 s"\n')
@@ -199,6 +215,14 @@ def test_two_procedures_that_find_one_number_agree_or_contradict_each_other(solv
     for result in outcome.results:
         assert "by static-torque, which contradict each other" in result.conflict
     assert not outcome.is_good
+
+
+def test_a_set_says_from_which_recordings_it_was_made(solved: Solve, bench: Path) -> None:
+    notes = solved(STATIC).new_set.parameter_set.notes
+    assert "on the set 'ppafo2011' from synthetic recordings: static.csv; " in notes
+    text = (bench / "static.csv").read_text()
+    (bench / "static.csv").write_text("".join(line for line in text.splitlines(True) if line[0] != "#"))
+    assert "from measured recordings: static.csv; " in solved(STATIC).new_set.parameter_set.notes
 
 
 def test_the_citation_of_a_problem_is_that_of_the_new_set(solved: Solve) -> None:

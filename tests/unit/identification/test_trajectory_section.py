@@ -12,6 +12,7 @@ import pytest
 from ppafo.analyses.identify import Identification, finding_of, identify
 from ppafo.cli.main import main
 from ppafo.errors import PpafoError
+from ppafo.identification.source import UsedRecording, double_use
 from ppafo.parameters.device import Orifice
 from ppafo.parameters.loading import load_device, parameter_set_toml, parse_parameter_set
 from ppafo.report.finding import text_of
@@ -444,3 +445,11 @@ def test_a_recording_of_a_bench_procedure_that_is_fitted_too_is_refused(
     told = rf"free-decay \(decay\.csv sha256:.*'step' \({name} sha256:.*are the same recording.*would count twice"
     with pytest.raises(PpafoError, match=told):
         solve(f"{DECAY}{text}")
+
+
+def test_other_times_of_a_recording_of_a_bench_procedure_may_be_fitted() -> None:
+    recording = Recording("decay", np.arange(10.0), {"angle": Channel(np.arange(10.0), "rad")})
+    bench = UsedRecording("procedure", "decay.csv", recording, last=4.0)
+    fitted = UsedRecording("experiment", "copy.csv", recording, frozenset({"angle"}), 4.0, 9.0)
+    assert double_use([bench, fitted]) == ""
+    assert "would count twice" in double_use([bench, replace(fitted, first=3.0)])

@@ -7,8 +7,13 @@ import pytest
 
 from ppafo.analyses.identify import Identification, finding_of, identify
 from ppafo.errors import IdentificationError
+from ppafo.identification.bench.law import BenchContext, BenchResult
+from ppafo.identification.estimate import Estimate
+from ppafo.identification.procedures import with_tried_units
 from ppafo.identification.source import RecordingSource
+from ppafo.parameters.loading import load_parameter_set
 from ppafo.parameters.parameter_set import number_in_si
+from ppafo.signals import Channel, Recording
 from ppafo.units import from_si
 from tests.unit.identification import planted
 
@@ -78,6 +83,28 @@ def test_a_jet_wider_than_its_opening_is_a_wrong_unit_where_the_other_unit_gives
     assert not found.is_good
 
 
+def test_a_jet_wider_than_its_opening_is_no_wrong_unit_where_no_unit_gives_the_set(tmp_path: Path) -> None:
+    found = flow_of_orifice(tmp_path, 1.3, 1.0e5, "kPa_g", "kPa_g")
+    assert found.estimates[0].verdict == "holds for this model only"
+
+
+def test_an_accusation_is_not_hidden_by_another_unit_that_scatters_less() -> None:
+    upstream = np.linspace(2.0e5, 3.0e5, 30)
+    source = planted.source("flow", np.arange(30.0), upstream_pressure=(upstream, "Pa"), mass_flow=(upstream, "kg/s"))
+
+    def run(sources: tuple[RecordingSource, ...]) -> BenchResult:
+        """Cd 1.64 as read, the set's where bar was read as psi, and 9 with far less scatter in kPa."""
+        factor = round(2.0e5 / sources[0].recording["upstream_pressure"][0], 3)
+        value, scatter = {1.0: (1.64, 0.05), 0.069: (0.113, 0.05), 0.145: (9.0, 0.001)}.get(factor, (5.0, 0.05))
+        path = "valves.proportional.discharge_coefficient"
+        estimate = Estimate(path, value, "-", value, value, "identified", "", ())
+        return BenchResult("open-valve-flow", "", (estimate,), "measured", scatter=scatter)
+
+    result = with_tried_units(run((source,)), (source,), BenchContext(load_parameter_set("ppafo2011"), "", ""), run)
+    assert result.estimates[0].verdict == "unit probably wrong"
+    assert "bar read as psi" in result.estimates[0].explanation
+
+
 def flow_of_orifice(folder: Path, coefficient: float, rise: float, true: str, read: str) -> Identification:
     """Identify exact readings of an orifice of 10 mm^2, air at 20 degC, from the shipped set, which has 0.113.
 
@@ -145,6 +172,12 @@ def test_a_table_of_flow_gives_the_conductance_of_its_formula(tmp_path: Path, at
     assert ratio.value == pytest.approx(0.3, abs=0.03)
 
 
+def test_a_pressure_in_a_unit_that_scatters_is_wrong_where_the_other_unit_gives_the_set(tmp_path: Path) -> None:
+    (result,) = flow_table(tmp_path, "kPa_g", ', gas = "air"').results
+    assert {estimate.verdict for estimate in result.estimates} == {"unit probably wrong"}
+    assert "psi read as kPa, a factor of 6.895" in result.estimates[0].explanation
+
+
 def test_a_flow_metered_as_one_gas_is_not_used_in_the_law_of_another(tmp_path: Path) -> None:
     with pytest.raises(
         IdentificationError, match=r"a flow of CO2, 0\.044 kg/mol, but .* is the set's, 0\.02897 kg/mol$"
@@ -157,3 +190,12 @@ def test_a_flow_metered_as_one_gas_is_not_used_in_the_law_of_another(tmp_path: P
     assert litres[0] == pytest.approx(2.0e-8, rel=0.01)
     # A volume of a lighter gas passes in proportion to 1/sqrt(M): C follows from the volume flow.
     assert litres[1] != litres[0]
+
+
+@pytest.mark.parametrize("scale", [1.0e3, 1.0e-3])
+def test_a_free_decay_in_a_wrong_unit_of_time_is_refused(scale: float, tmp_path: Path) -> None:
+    time = np.arange(0.0, 2.0, 1.0e-3)
+    swing = 0.3 * np.exp(-2.0 * time) * np.cos(30.0 * time)
+    decay = RecordingSource(Recording("decay", scale * time, {"angle": Channel(swing, "rad")}))
+    with pytest.raises(IdentificationError, match="is the unit of time"):
+        solved(tmp_path, decay, 'kind = "free-decay"\ninertia = "8 g m^2"\n', {})

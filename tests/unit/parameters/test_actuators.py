@@ -259,6 +259,13 @@ def test_a_run_of_a_study_that_the_table_does_not_hold_for_is_refused_as_alone(
     assert str(alone.value).endswith(screen.reasons[1])
 
 
+def test_stops_beyond_what_was_measured_are_refused(tmp_path: Path) -> None:
+    measured(tmp_path, HEADER, *GOOD).rename(tmp_path / "measured-bladder.csv")
+    (tmp_path / "set.toml").write_bytes((EXAMPLE / "measured-bladder.toml").read_bytes())
+    with pytest.raises(ParameterError, match="volume table covers 20 to 100 deg, but the stops are at 20 to 110 deg"):
+        load_device(tmp_path / "set.toml")
+
+
 @pytest.mark.parametrize(
     ("name", "override", "said"),
     [
@@ -271,3 +278,11 @@ def test_numbers_that_do_not_fit_together_are_refused(name: str, override: str, 
     with pytest.raises(PpafoError) as caught:
         load_device(name, overrides=[override])
     assert said in str(caught.value)
+
+
+def test_a_run_of_an_ensemble_whose_lever_comes_to_its_dead_centre_is_refused_and_the_others_go_on() -> None:
+    base = load_scenario(EXAMPLE / "torque-task-cylinder.toml")
+    offsets = np.radians([15.0, 60.0, 20.0])
+    screen = screen_columns(check_columns(base, {"actuator.lever_offset": offsets}))
+    assert screen.members.tolist() == [0, 2]
+    assert "actuator: the angle between lever and base is 80 to 190 deg" in screen.reasons[1]

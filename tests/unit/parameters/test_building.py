@@ -85,6 +85,12 @@ def test_an_orifice_can_have_the_form_of_iso_6358() -> None:
     assert orifice.critical_ratio == 0.4
 
 
+def test_a_critical_ratio_beyond_its_range_is_refused() -> None:
+    message = problem_of("valve.sonic_conductance=0.5 L/(s bar)", "valve.critical_ratio=1.2")
+    assert "critical_ratio = 1.2: " in message
+    assert "at most 0.95" in message
+
+
 def test_half_of_the_form_of_iso_6358_is_incomplete() -> None:
     assert "valves.proportional.critical_ratio" in problem_of("valve.sonic_conductance=0.5 L/(s bar)")
 

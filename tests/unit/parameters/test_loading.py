@@ -1,11 +1,13 @@
 """Parameter sets from names and files, and every mistake that a file can have."""
 
 import re
+from importlib import resources
+from pathlib import Path
 
 import pytest
 
 from ppafo.errors import ParameterError
-from ppafo.parameters import list_sets, load_parameter_set
+from ppafo.parameters import list_sets, load_device, load_parameter_set
 from ppafo.parameters.loading import parameter_set_toml, parse_parameter_set
 
 SMALL = """
@@ -126,3 +128,12 @@ def test_a_mistake_in_a_file_names_its_key_what_is_allowed_and_the_nearest(old: 
 @pytest.mark.parametrize("value", ["true", '"14"', "[14]", "nan", "inf", "1979-05-27"])
 def test_a_value_that_is_no_finite_number_is_refused(value: str) -> None:
     assert "actuator.torque_constant.value = " in problem_of(changed("value = 14", f"value = {value}"))
+
+
+def test_a_wrong_dimension_is_kept_for_the_audit_and_refused_for_a_device(tmp_path: Path) -> None:
+    text = (resources.files("ppafo.parameters") / "sets" / "ppafo2011.toml").read_text(encoding="utf-8")
+    file = tmp_path / "wrong.toml"
+    file.write_text(text.replace('value = 31.6\nunit = "mm^2"', 'value = 31.6\nunit = "mm"'))
+    load_parameter_set(file)
+    with pytest.raises(ParameterError, match=r"wrong.toml: valves.proportional.area = 31.6 mm: unit 'mm' does not fit"):
+        load_device(file)

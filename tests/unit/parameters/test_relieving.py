@@ -1,5 +1,7 @@
 """The key ``supply.relieving``: in files, overrides and scenarios, and the walls that it meets."""
 
+from pathlib import Path
+
 import pytest
 
 import ppafo
@@ -54,3 +56,9 @@ def test_a_leaking_step_with_an_empty_bottle_agrees_with_the_reference_solver() 
     agreement = compare_with_reference(plan_run(ppafo.load_scenario("step-response", [*EMPTY, *filled])))
     assert agreement.worst_pressure < 1.0e-3
     assert agreement.angle < 2.0e-4
+
+
+def test_an_empty_bottle_has_no_full_range_to_validate_against(tmp_path: Path) -> None:
+    ppafo.simulate("step-response", [*EMPTY, "motion.ankle_torque=5 N m"]).save(tmp_path / "bench")
+    with pytest.raises(PpafoError, match="must be above atmospheric pressure, because"):
+        ppafo.validate("ppafo2011", [tmp_path / "bench"], overrides=EMPTY)

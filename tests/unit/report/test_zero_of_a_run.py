@@ -3,7 +3,8 @@
 import pytest
 
 from ppafo.metrics import Metric
-from ppafo.report.kind import Kind, metric_change, metric_text, metrics_lines
+from ppafo.report.kind import ConfidenceInterval, Kind, metric_change, metric_text, metrics_lines, of_metric
+from ppafo.simulation.check import ErrorEstimate
 from ppafo.units.shown import shown_in
 
 ROUNDING = {
@@ -32,3 +33,11 @@ def test_a_pressure_at_the_atmosphere_is_0_in_the_units_of_a_set() -> None:
         assert metric_text(101325.0 + 6.6e-7, "Pa_a") == "0 bar_g"
         assert metric_change(6.6378e-7, "Pa_d") == (0.0, "bar")
         assert Kind("", "Pa_a", "pressure").shown(101326.0) == pytest.approx(1.0e-5)
+
+
+def test_zero_has_neither_sign_nor_exponent() -> None:
+    kind = of_metric("gas_supplied", "+.3g")
+    assert kind.change_interval(ConfidenceInterval(1.0e-18, -1.0e-18, 0.0)) == "0 [0, 0]"
+    assert ErrorEstimate(0.0, 0.3, {}).sentence.startswith(
+        "Estimated error of the time steps: at most 0 deg and 4.4e-05 psi"
+    )

@@ -44,11 +44,44 @@ def test_what_is_made_of_a_recording_is_of_its_kind() -> None:
     assert given != Recording(given.label, given.time, given.channels, "simulated")
 
 
+def test_a_recording_cannot_be_changed() -> None:
+    given = recording()
+    with pytest.raises(ValueError, match="read-only"):
+        given["angle"][0] = 5.0
+    with pytest.raises(ValueError, match="read-only"):
+        given.time[0] = 5.0
+    with pytest.raises(TypeError):
+        given.channels["angle"] = given.channels["command"]  # type: ignore[index]
+
+
 def test_a_recording_does_not_follow_the_arrays_it_was_made_of() -> None:
     values = np.array([0.0, 1.0])
     given = Recording("bench", np.array([0.0, 1.0]), {"angle": Channel(values, "rad")})
     values[0] = 9.0
     assert given["angle"][0] == 0.0
+
+
+@pytest.mark.parametrize("times", [[], [0.0, 1.0, 1.0], [0.0, 2.0, 1.0]])
+def test_time_that_is_empty_or_does_not_grow_is_refused(times: list[float]) -> None:
+    with pytest.raises(DataError, match=r"has no samples|time must increase"):
+        Recording("bench", np.array(times), {})
+
+
+@pytest.mark.parametrize(
+    ("name", "last", "unit"),
+    [
+        ("angle", [np.nan], "rad"),
+        ("angle", [np.inf], "rad"),
+        ("angle", [0.0], "deg"),
+        ("torque", [], "N m"),
+        ("time", [0.0], "s"),
+        ("Angle (deg)", [0.0], "deg"),
+        ("residual", [0.0], "N [m]"),
+    ],
+)
+def test_a_channel_that_no_file_could_hold_is_refused(name: str, last: list[float], unit: str) -> None:
+    with pytest.raises(DataError):
+        recording().with_channel(name, [0.0, 1.0, 2.0, 3.0, *last], unit)
 
 
 def test_a_channel_can_be_added_and_replaced_without_touching_the_original() -> None:
@@ -69,6 +102,11 @@ def test_between_samples_a_command_is_held_and_everything_else_runs_straight() -
     moved = recording().resample([0.5, 1.75, 4.0])
     assert moved["angle"].tolist() == [0.5, 1.75, 4.0]
     assert moved["command"].tolist() == [1.0, -1.0, 1.0]
+
+
+def test_nothing_is_made_up_outside_a_recording() -> None:
+    with pytest.raises(DataError, match="cannot be resampled from 3 s to 4"):
+        recording().resample([3.0, 4.5])
 
 
 def test_recordings_that_differ_in_one_bit_are_not_equal() -> None:

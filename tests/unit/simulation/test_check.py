@@ -15,6 +15,7 @@ from ppafo.running import simulate
 from ppafo.simulation.check import FINER, MOVED_MEASUREMENT, MOVED_START, Check, ErrorEstimate, NumberCheck
 from ppafo.simulation.loading import list_scenarios
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import Status
 
 CHAOTIC = (
     "motion.kind=free",
@@ -148,6 +149,12 @@ def test_a_controller_that_gives_another_run_each_time_is_refused(torque_task: C
     with pytest.raises(
         SimulationError, match=r"Unforgetting gives different results in equal runs.* reset\(\) must restore"
     ):
+        result.check()
+
+
+def test_a_run_that_diverged_is_not_checked(step_response: Scenario) -> None:
+    result = dataclasses.replace(simulate(step_response), status=Status("diverged", 0.01, "diverged at t = 0.01 s"))
+    with pytest.raises(SimulationError, match="step-response: the run diverged"):
         result.check()
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.errors import ScenarioError
+from ppafo.errors import PpafoError, ScenarioError
 from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.ensemble.planning import check_columns, plan_ensemble
@@ -49,6 +49,20 @@ def test_a_single_chamber_takes_no_reference_of_the_other() -> None:
 def test_its_recording_without_the_second_pressure_is_replayed(bladder: Scenario) -> None:
     validated = ppafo.validate(str(BLADDER), [ppafo.simulate(bladder).recording], motion="locked")
     assert validated.found.passes
+
+
+@pytest.mark.parametrize(
+    "path", ["actuator.dead_volume_2=3 cm^3", "actuator.leak.area=0.5 mm^2", "supply.dorsiflexion_pressure=20 psi_g"]
+)
+def test_numbers_of_a_second_chamber_are_refused(path: str) -> None:
+    with pytest.raises(PpafoError, match="the actuator has one chamber"):
+        ppafo.load_device(BLADDER, overrides=[path])
+
+
+def test_a_second_chamber_takes_no_pressure_at_the_start() -> None:
+    for text in ("20 psi_g", "supply"):
+        with pytest.raises(ScenarioError, match=r"one chamber.*omit this key"):
+            ppafo.load_scenario("torque-task-proportional", [f"device.set={BLADDER}", f"initial.pressure_2={text}"])
 
 
 def test_a_command_towards_the_second_chamber_takes_no_gas() -> None:

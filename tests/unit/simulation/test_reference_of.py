@@ -123,6 +123,16 @@ def test_an_ensemble_refuses_the_run_whose_pressure_no_supply_gives() -> None:
     assert ": 40 psi_g" in found.reasons[1]
 
 
+def test_an_ensemble_refuses_the_run_whose_reference_is_beyond_the_stops() -> None:
+    scenario = scenario_from_dict(document("angle", "95 deg", "cascade", **FREE))
+    levels = np.radians([90.0, 170.0])
+    found = run_ensemble(scenario, {"reference.level": levels}, ["rms_angle_error"])
+    assert found.status.tolist() == [COMPLETED, REFUSED]
+    assert "[reference] leaves the stops" in found.reasons[1]
+    with pytest.raises(ScenarioError, match="'reference'"):
+        run_ensemble(scenario, {"reference.level": levels[:1]}, [], bands=["reference"])
+
+
 def held_angle(scenario: Scenario) -> tuple[float, float, float]:
     """Largest error of the last 0.3 s [rad], reversals of the command, and how far the angle overshoots [rad]."""
     run = simulate(scenario)

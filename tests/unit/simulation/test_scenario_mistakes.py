@@ -145,12 +145,38 @@ def test_a_value_that_does_not_fit_says_what_would(old: str, new: str, reason: s
         assert parse_scenario(TEXT.replace(old, new).encode(), "task.toml").sensors.seed == 1
 
 
+@pytest.mark.parametrize(
+    ("angle", "stops"),
+    [
+        ("19.9 deg", "20 deg to 130 deg"),
+        ("-1 rad", "0.349066 rad to 2.26893 rad"),
+    ],
+)
+def test_an_angle_outside_the_stops_is_refused_with_the_stops_in_its_unit(angle: str, stops: str) -> None:
+    assert f"must be between the stops of ppafo2011, {stops}" in problem_after('"75 deg"', f'"{angle}"')
+
+
 @pytest.mark.parametrize("angle", ["20 deg", "130 deg"])
 def test_an_angle_on_a_stop_is_allowed(angle: str) -> None:
     assert parse_scenario(TEXT.replace("75 deg", angle).encode(), "task.toml")
 
 
 PRESCRIBED = 'kind = "prescribed"\n[motion.profile]\n'
+
+
+@pytest.mark.parametrize(
+    "profile",
+    [
+        'kind = "sine"\nlevel = "75 deg"\namplitude = "55.1 deg"\nfrequency = "0.7 Hz"',
+        'kind = "sine"\nlevel = "75 deg"\namplitude = "-56 deg"\nfrequency = "97.3 Hz"',
+        'kind = "ramp_hold"\nstart_level = "75 deg"\nlevel = "131 deg"',
+        'kind = "ramp_hold"\nstart_level = "0 deg"\nlevel = "75 deg"\nramp_time = "1 us"',
+    ],
+)
+def test_a_prescribed_vane_that_leaves_the_stops_is_refused_with_the_time(profile: str) -> None:
+    message = problem_after('kind = "locked"\nangle = "75 deg"', PRESCRIBED + profile)
+    assert "[motion.profile] leaves the stops of ppafo2011, 20 deg to 130 deg: " in message
+    assert message.endswith(" s")
 
 
 def test_a_prescribed_vane_may_touch_the_stops() -> None:

@@ -76,6 +76,11 @@ def test_a_gain_of_0_needs_no_unit_whatever_is_controlled() -> None:
         load_scenario("pressure-loop", ["controller.proportional_gain=1"])
 
 
+@pytest.mark.parametrize("override", ["motion.angle=80", "run.duration=2", "reference.level=5", "sensors.delay=1"])
+def test_any_other_value_must_say_its_unit(override: str) -> None:
+    assert "a number without a unit" in problem_of(override)
+
+
 PATHS = [*OF_A_VANE.paths(load_scenario(TASK).origin.content), *device_paths()]
 
 

@@ -99,6 +99,14 @@ def test_a_command_beyond_the_valve_is_refused(name: str, command: Any, said: st
         ppafo.start(name).step(command)
 
 
+def test_a_run_that_is_over_takes_no_command() -> None:
+    run = ppafo.start("step-response", {"run.duration": "1 ms"})
+    while not run.is_over:
+        run.step(1)
+    with pytest.raises(ppafo.SimulationError, match=r"over at t = 0\.001 s"):
+        run.step(0.0)
+
+
 def test_a_run_that_diverges_is_over() -> None:
     run = ppafo.start("step-response", ["motion.kind=free", "foot_plate.inertia=1e-12 kg m^2"])
     while not run.is_over:

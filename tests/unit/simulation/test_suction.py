@@ -19,6 +19,7 @@ from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
+from ppafo.walking.loading import load_walk
 
 BLADDER = Path(__file__).parents[2] / "actuators" / "measured-bladder.toml"
 ROOM, VACUUM = 101325.0, 41325.0
@@ -229,3 +230,10 @@ def test_what_makes_no_sense_with_a_vacuum_is_refused_in_one_line(overrides: tup
         load_scenario(TASK, overrides)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_walk_on_a_vacuum_is_refused_in_one_line() -> None:
+    with pytest.raises(
+        PpafoError, match=r"^solenoid: \[device\]: a walk, .* needs a supply above atmospheric pressure"
+    ):
+        load_walk("solenoid", SUCTION)

@@ -1,12 +1,14 @@
 """A run that does not follow its reference says so, with what hinders it; one that does is left alone."""
 
+import ast
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from ppafo.loading import load_scenario
+from ppafo.loading import load_scenario, reloaded
 from ppafo.metrics.metric import hold_start
 from ppafo.metrics.settled import SettledPart
 from ppafo.parameters.reach import supply_for, torque_reach
@@ -270,6 +272,13 @@ def test_a_judged_part_without_a_peak_gives_no_verdict_and_a_slower_trial_is_lon
     assert simulate("cylinder-servo", [LATE_SINE[0], *slowest]).tracking.follows
 
 
+def test_a_smooth_wave_of_a_torque_has_a_limit_on_its_largest_error() -> None:
+    spikes = sampled(np.where(np.arange(200) % 50 < 3, 17.0, 0.0), "torque")
+    wave = moving(spikes)._replace(reference_deviation=28.0)
+    assert failure_of(wave) is None
+    assert failure_of(wave._replace(is_reference_smooth=True)) == "does not follow"
+
+
 def failure_of(part: SettledPart) -> str | None:
     """Kind of failure of a part with gradual openings whose command does not turn."""
     return failure_of_task(excess_of_part(part, False), 0.0)
@@ -319,9 +328,29 @@ def test_an_angle_is_held_to_degrees_where_a_torque_is_held_to_shares(
     assert failure_of(torque) is None
 
 
+def test_a_quick_ramp_excuses_no_error_beyond_the_way() -> None:
+    ramp = moving(sampled(np.linspace(0.0, 43.0, 200), "torque"))._replace(weight=0.01, way=40.0)
+    assert failure_of(ramp) is None
+    assert failure_of(ramp._replace(largest_error=45.0)) == "does not follow"
+
+
 @pytest.mark.filterwarnings("error")
 def test_an_actuator_without_a_supply_is_judged_without_a_warning() -> None:
     assert simulate(TASK, ["supply.pressure=0 psi_g"]).tracking.fails
+
+
+def test_a_joint_that_reaches_a_stop_is_told_side_time_and_share_although_its_torque_follows() -> None:
+    free = simulate(TASK, ["motion.kind=free", "reference.level=3 N m"])
+    assert free.tracking.follows
+    rests = np.degrees(free["angle"]) > 129.9
+    reached, share = free["time"][int(np.argmax(rests))], 100.0 * np.count_nonzero(rests) / rests.size
+    assert free.warnings[0].startswith(
+        f"the joint reaches its upper stop (130 deg) at {reached:.3g} s and lies on it for {share:.0f} % of the run"
+    )
+    pressed = simulate("cylinder-servo", ["motion.external_torque=20 N m"]).warnings
+    assert any(text.startswith("the joint reaches its lower stop (20 deg) at 0.03") for text in pressed)
+    for scenario in ("cylinder-servo", "pressure-loop", "torque-task-moving-ankle"):
+        assert simulate(scenario).warnings == ()
 
 
 @pytest.mark.parametrize("law", ["pid", "on_off"])
@@ -336,6 +365,26 @@ def test_a_changed_sensor_that_the_controller_does_not_read_is_told_so(law: str)
     pressed = simulate(TASK, [*task, "sensors.pressure_noise=0.5 psi_d", "sensors.seed=2"])
     assert not np.array_equal(quiet["command"], pressed["command"])
     assert not any("without effect" in said for said in (*quiet.warnings, *pressed.warnings))
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        (["run.output_interval=1 s"], "4 samples are too few"),
+        (["run.duration=2 ms"], "3 samples are too few"),
+        (["run.output_interval=1 s", "reference.ramp_time=20 s"], "4 samples are too few"),
+        (["reference.ramp_time=5 h"], "the run ends on the ramp of its reference, with an RMS error of 0.0001"),
+        (["run.duration=0.9 s"], "the run ends on the ramp of its reference, with an RMS error of 0."),
+    ],
+)
+def test_a_run_without_a_verdict_says_why_and_its_remedy_gives_one(changes: list[str], reason: str) -> None:
+    given = ["reference.level=4 N m", *changes]
+    told = simulate(TASK, given).tracking.sentence
+    found = re.search(r"; not tried: overrides=(.*) should give one$", told)
+    assert found is not None
+    assert told.startswith(f"no verdict on the torque: {reason}")
+    again = simulate(reloaded(load_scenario(TASK, given), ast.literal_eval(found[1])))
+    assert re.match(r"the torque follows its reference; from [\d.]+ s on: RMS error ", again.tracking.sentence)
 
 
 TOLERANT = ["reference.kind=ramp_hold", "reference.start_level=90 deg", "reference.level=92 deg"]

@@ -10,6 +10,7 @@ import pytest
 import ppafo
 from ppafo.cli.main import main
 from ppafo.loading import load_scenario
+from ppafo.metrics.metric import followed
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
 from ppafo.simulation.tracking.rule import (
@@ -187,3 +188,12 @@ def test_a_comparison_says_in_how_many_draws_each_configuration_follows() -> Non
     # As in a sweep: what is beyond reach on purpose in some draws is not missed.
     assert 0 < followed_in["solenoid"] < followed_in["proportional"] == 32
     assert f"{cases[0].following} of 32" in str(finding)
+
+
+def test_an_angle_that_is_stuck_on_its_way_out_and_back_does_not_follow() -> None:
+    knots = table((0.0, 80.0), (0.3, 90.0), (0.8, 90.0), (1.1, 80.0), unit="deg")
+    stuck = ["friction.static_torque=8 N m", "friction.dynamic_torque=7 N m", "motion.angle=80 deg"]
+    result = simulate(load_scenario("cylinder-servo", [*knots, *stuck]))
+    reference, angle = followed(result.recording)
+    assert np.ptp(angle) < 1e-6 < np.ptp(reference)
+    assert result.tracking.kind == "does not move"

@@ -72,6 +72,30 @@ def test_minutes_have_no_fraction() -> None:
     assert clock_seconds(["00:10.5", "00:11.0"], rows(2)).tolist() == [0.0, 0.5]
 
 
+@pytest.mark.parametrize(("order", "days"), [("day month", 1.0), ("month day", 31.0)])
+def test_dates_of_either_order_are_asked_about_where_it_matters(order: Any, days: float) -> None:
+    cells = ["03/04/2026 08:00:00", "04/04/2026 08:00:00"]
+    with pytest.raises(DataError, match='give date_order = "day month" or date_order = "month day"'):
+        clock_seconds(cells, rows(2))
+    expected = days if order == "day month" else 31.0
+    assert clock_seconds(cells, rows(2), order=order)[1] == expected * 86400.0
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        ["25:61:00", "25:62:00"],
+        ["08:00:00", "noon"],
+        ["13:00:00 PM", "13:00:01 PM"],
+        ["2026-13-41 08:00:00", "2026-13-41 08:00:01"],
+        ["08:00:00 CEST", "07:30:00 CET"],
+    ],
+)
+def test_what_is_no_time_is_refused(cells: list[str]) -> None:
+    with pytest.raises(DataError, match=r"is not a time of day|is not a date|several time zones"):
+        clock_seconds(cells, rows(2))
+
+
 @pytest.mark.parametrize("period", [2**32 * 1e-6, 2**32 * 1e-3], ids=["micros", "millis"])
 def test_a_counter_of_32_bits_is_counted_on(period: float) -> None:
     time = np.arange(0.0, 2.0, 0.01) + period - 1.0

@@ -13,7 +13,7 @@ import ppafo
 from ppafo.errors import DataError
 from ppafo.parameters.records import record_from
 from ppafo.storage.column_map import ColumnMap, load_column_map
-from ppafo.storage.foreign import read_foreign
+from ppafo.storage.foreign import read_foreign, read_trials
 from tests.repeatable import TOO_SLOW
 
 TIME = {"column": 1, "unit": "ms"}
@@ -98,6 +98,16 @@ def test_a_mark_that_stands_between_no_groups_is_refused(
     columns = mapped(delimiter="semicolon", decimal=decimal, channels={"torque": torque})
     with pytest.raises(DataError, match=f"line 2, column '2': '{cell}' must have groups of three digits"):
         read_foreign(written(tmp_path, f"0;1\n10;{cell}\n"), columns)
+
+
+def test_a_name_that_two_columns_have_is_refused_where_it_is_asked_for(tmp_path: Path) -> None:
+    text = "time,p,p,force\n0,1,2,3\n1,1,2,4\n"
+    time, force = {"column": "time", "unit": "s"}, {"column": "force", "unit": "N m"}
+    columns = mapped(header=True, channels={"time": time, "torque": force})
+    assert list(read_foreign(written(tmp_path, text), columns)["torque"]) == [3.0, 4.0]
+    columns = mapped(header=True, channels={"time": time, "torque": {"column": "p", "unit": "N m"}})
+    with pytest.raises(DataError, match=r"channels\.torque\.column = 'p': must be the number of a column"):
+        read_foreign(written(tmp_path, text), columns)
 
 
 def test_direction_and_sweeps_follow_from_the_rate_of_a_channel(tmp_path: Path) -> None:
@@ -249,3 +259,26 @@ def test_a_foreign_log_is_measured_and_read_through_a_map_by_name(tmp_path: Path
     )
     assert ppafo.evaluate(log, columns=f"{maps}:bench")["peak_torque"].value == pytest.approx(2.5)
     assert ppafo.read_recording(log, columns=load_column_map(maps))["torque"].tolist() == pytest.approx([0, 1.205, 2.5])
+
+
+def test_each_of_many_trials_with_a_clock_from_0_is_a_recording(tmp_path: Path) -> None:
+    rows = [f"{10 * n},{100 * trial + n}\n" for trial in (1, 2, 3) for n in range(5 - trial)]
+    path, channels = written(tmp_path, "".join(rows)), {"torque": {"column": 2, "unit": "N m"}}
+
+    def torques(trial: Any) -> list[list[float]]:
+        return [recording["torque"].tolist() for recording in read_trials(path, mapped(channels=channels, trial=trial))]
+
+    first, second, third = torques("all")
+    assert (first, second, third) == ([100.0, 101.0, 102.0, 103.0], [200.0, 201.0, 202.0], [300.0, 301.0])
+    assert torques([3, 1]) == [third, first]
+    recording = read_foreign(path, mapped(channels=channels, trial=2))
+    assert recording["torque"].tolist() == second
+    assert recording.time[0] == 0.0
+    for read, wrong in (
+        (read_foreign, {}),
+        (read_foreign, {"trial": 4}),
+        (read_foreign, {"trial": "all"}),
+        (read_trials, {"trial": [1, 7]}),
+    ):
+        with pytest.raises(DataError, match="trial"):
+            read(path, mapped(channels=channels, **wrong))

@@ -1,5 +1,6 @@
 """Files in the form in which real instruments and programs write them: LabVIEW, Arduino, Excel, MATLAB and Simulink."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -94,6 +95,23 @@ def test_a_flow_meter_shows_volume_at_a_condition(tmp_path: Path, flow: dict[str
     chosen = columns({"time": {"column": "t", "unit": "s"}, "mass_flow": flow})
     found = read_foreign(path, chosen, gas="0.044 kg/mol")
     assert np.allclose(found["mass_flow"], density * 1e-3 * np.array([1.0, 2.0]), rtol=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("flow", "by_map"),
+    [
+        ({"unit": "L/min (ANR)", "at": "DIN 1343"}, "L/min (DIN 1343, air)"),
+        ({"unit": "L/min (ANR, air)", "gas": "CO2"}, "L/min (ANR, CO2)"),
+    ],
+)
+def test_a_condition_or_gas_that_contradicts_the_unit_is_refused(
+    tmp_path: Path, flow: dict[str, Any], by_map: str
+) -> None:
+    path = written(tmp_path, "flow.csv", "t,Q\n0,60\n1,120\n")
+    chosen = columns({"time": {"column": "t", "unit": "s"}, "mass_flow": {"column": "Q", **flow}})
+    expected = f"means '{by_map}' by 'at' and 'gas', but 'L/min (ANR, air)' by 'unit'; give each only once"
+    with pytest.raises(DataError, match=re.escape(expected)):
+        read_foreign(path, chosen, gas="air")
 
 
 def test_a_header_may_state_condition_and_gas(tmp_path: Path) -> None:

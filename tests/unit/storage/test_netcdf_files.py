@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import h5netcdf
 import numpy as np
 import pytest
 
@@ -55,6 +56,20 @@ def test_a_file_cut_off_anywhere_is_refused_by_name(tmp_path: Path) -> None:
         path.write_bytes(whole[: int(len(whole) * share)])
         with pytest.raises(DataError, match="not a complete NetCDF recording"):
             read_netcdf(path)
+
+
+def changed(folder: Path, variable: str, units: str) -> Path:
+    path = written(folder, recording())
+    with h5netcdf.File(path, "a") as file:
+        file.variables[variable].attrs["units"] = units
+    return path
+
+
+def test_a_wrong_unit_is_refused_by_file_and_channel(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match=r"bench\.nc: .*channel 'angle' must be in 'rad', not in 'deg'"):
+        read_netcdf(changed(tmp_path, "angle", "deg"))
+    with pytest.raises(DataError, match=r"'time' must be in 's', not in 'ms'"):
+        read_netcdf(changed(tmp_path, "time", "ms"))
 
 
 def test_what_a_channel_declares_between_its_samples_is_an_attribute(tmp_path: Path) -> None:

@@ -1,7 +1,9 @@
 """Folders that a command makes whole: one policy for results and reproductions."""
 
 import errno
+import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -62,6 +64,69 @@ def test_only_files_whose_hash_the_mark_states_are_removed(tmp_path: Path) -> No
     (out / "thesis.txt").unlink()
     write_reproduction(out, WHOLE)
     assert contents(out) == WHOLE
+
+
+def test_a_mark_without_hashes_removes_nothing(tmp_path: Path) -> None:
+    mark = {"format": "ppafo files", "schema_version": 1, "command": "reproduce", "files": ["thesis.txt"]}
+    (tmp_path / MARK).write_text(json.dumps(mark))
+    (tmp_path / "thesis.txt").write_text("years of work")
+    with pytest.raises(DataError, match=r"has no file hashes"):
+        write_reproduction(tmp_path, WHOLE)
+
+
+def test_folders_inside_a_result_are_its_own_and_what_others_put_into_them_is_not(tmp_path: Path) -> None:
+    out, kind = tmp_path / "out", marked_folder("export c")
+    write_marked_folder(out, {"README.md": b"", "sources/deep/engine.c": b"1"}, "export c")
+    write_marked_folder(out, {"README.md": b"", "sources/deep/engine.c": b"2"}, "export c")
+    assert (out / "sources" / "deep" / "engine.c").read_bytes() == b"2"
+    (out / "sources" / "deep" / "notes.txt").write_text("mine")
+    with pytest.raises(DataError, match=r"\(sources/deep/notes\.txt\)"):
+        check_owned_folder(out, kind)
+    (out / "sources" / "deep" / "notes.txt").unlink()
+    (out / "sources" / "mine").mkdir()
+    with pytest.raises(DataError, match=r"\(sources/mine\)"):
+        check_owned_folder(out, kind)
+
+
+def something_else(folder: Path) -> str:
+    (folder / "thesis.txt").write_text("years of work")
+    return rf"is not empty and not a result of 'ppafo reproduce' \(it has no {MARK}\); choose another folder"
+
+
+def a_reproduction_and_notes(folder: Path) -> str:
+    write_reproduction(folder, WHOLE)
+    (folder / "notes.txt").write_text("mine")
+    return r"contains files that are not part of its result of 'ppafo reproduce' \(notes\.txt\)"
+
+
+def a_reproduction_with_a_folder_in_it(folder: Path) -> str:
+    write_reproduction(folder, WHOLE)
+    (folder / "report.html").unlink()
+    (folder / "report.html").mkdir()
+    return r"contains files that are not part of its result of 'ppafo reproduce' \(report\.html\)"
+
+
+FILLS = (
+    something_else,
+    a_reproduction_and_notes,
+    a_reproduction_with_a_folder_in_it,
+)
+
+
+@pytest.mark.parametrize("fill", FILLS, ids=lambda fill: fill.__name__)
+def test_a_folder_with_anything_of_somebody_elses_is_refused_and_left_alone(
+    fill: Callable[[Path], str], tmp_path: Path
+) -> None:
+    folder = tmp_path / "out"
+    folder.mkdir()
+    message = fill(folder)
+    before = contents(folder)
+    with pytest.raises(DataError, match=message):
+        check_reproduction_folder(folder)
+    with pytest.raises(DataError, match=message):
+        write_reproduction(folder, WHOLE)
+    assert contents(folder) == before
+    assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
 
 
 def test_a_failure_while_writing_leaves_the_earlier_reproduction(

@@ -42,3 +42,13 @@ def test_columns_come_back_with_their_units() -> None:
 def test_a_file_that_is_not_whole_is_refused(damage: object) -> None:
     with pytest.raises(DataError, match="file: is not a complete Parquet file"):
         read_parquet(io.BytesIO(damage(content())), "file")  # type: ignore[operator]
+
+
+def test_a_changed_bit_in_the_data_is_found_by_the_checksum_of_its_page() -> None:
+    import pyarrow.parquet
+
+    whole = content()
+    column = pyarrow.parquet.ParquetFile(io.BytesIO(whole)).metadata.row_group(0).column(1)
+    place = column.data_page_offset + column.total_compressed_size // 2
+    with pytest.raises(DataError, match="not a complete Parquet file"):
+        read_parquet(io.BytesIO(whole[:place] + bytes([whole[place] ^ 4]) + whole[place + 1 :]), "file")

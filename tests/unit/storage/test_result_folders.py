@@ -61,6 +61,17 @@ def test_a_check_leaves_no_trace(tmp_path: Path) -> None:
     assert names(tmp_path) == []
 
 
+def test_a_place_where_the_system_lets_nobody_write_is_found_by_trying(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(self: Path, *arguments: object, **options: object) -> None:
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr(Path, "mkdir", refused)
+    with pytest.raises(DataError, match="task: cannot be written: read-only file system"):
+        check_result_folder(tmp_path / "task")
+
+
 def interrupt_at(monkeypatch: pytest.MonkeyPatch, method: str, call: int) -> None:
     """Raise KeyboardInterrupt at the given call of a method of Path."""
     original = getattr(Path, method)
@@ -98,3 +109,12 @@ def test_an_interrupt_leaves_an_earlier_result_as_it_was(
     monkeypatch.undo()
     assert read_stored(folder).recording == recording(1.0)
     assert names(tmp_path) == ["task"]
+
+
+def test_a_recording_that_changed_on_disk_is_refused_before_it_is_opened(tmp_path: Path) -> None:
+    folder = write_result(tmp_path / "task", recording(), DOCUMENT, {})
+    damaged = bytearray((folder / "recording.nc").read_bytes())
+    damaged[len(damaged) // 2] ^= 1
+    (folder / "recording.nc").write_bytes(damaged)
+    with pytest.raises(DataError, match=r"recording\.nc: is not the file that was written with run\.json"):
+        read_stored(folder)

@@ -64,6 +64,10 @@ def test_a_path_must_exist_in_every_configuration_that_varies_it(varying: Callab
     assert "did you mean 'proportional'?" in refused(document)
 
 
+def test_a_path_is_varied_once(varying: Callable[..., Any]) -> None:
+    assert "'valve.area' is varied twice" in refused(varying(AREA, CD, AREA))
+
+
 def test_a_study_that_varies_nothing_is_refused_unless_it_compares(small: Any) -> None:
     for key in ("vary", "correlations", "sample"):
         del small[key]
@@ -87,6 +91,16 @@ def test_unknown_outputs_are_refused_with_the_nearest(small: Any, outputs: Any, 
     assert expected in refused(small)
 
 
+def test_the_duration_varies_only_where_nothing_is_kept_over_time(small: Any) -> None:
+    small["vary"].append({"path": "run.duration", "kind": "list", "values": ["0.1 s", "0.2 s"]})
+    assert "'run.duration' cannot vary with trajectories or bands" in refused(small)
+    small["outputs"] = {"metrics": ["rms_error"]}
+    assert "'run.duration=0.2 s' is set and 'run.duration' is varied" in refused(small)
+    for table in small["configurations"]:
+        table["overrides"] = [text for text in table["overrides"] if not text.startswith("run.duration")]
+    assert load_study(small).runs == 64
+
+
 def test_metrics_of_tracking_need_a_reference(varying: Callable[..., Any]) -> None:
     document = varying(AREA)
     document["configurations"] = [{"name": "step", "scenario": "step-response"}]
@@ -94,6 +108,15 @@ def test_metrics_of_tracking_need_a_reference(varying: Callable[..., Any]) -> No
     document["outputs"] = {"metrics": "all"}
     assert "rms_error" not in load_study(document).outputs.metrics
     assert "gas_supplied" in load_study(document).outputs.metrics
+
+
+def test_correlations_that_cannot_hold_at_once_are_refused(varying: Callable[..., Any]) -> None:
+    document = varying(AREA, LEAK, CD)
+    pairs = [("valve.area", "actuator.leak.area", 0.6), ("valve.area", CD["path"], 0.6)]
+    document["correlations"] = [{"between": [one, other], "coefficient": value} for one, other, value in pairs]
+    assert load_study(document).scores is not None
+    document["correlations"].append({"between": ["actuator.leak.area", CD["path"]], "coefficient": -0.9})
+    assert "not positive definite (valve.area with actuator.leak.area: 0.6" in refused(document)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import pytest
 from ppafo.errors import StudyError
 from ppafo.progress import Progress
 from ppafo.running import simulate
+from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import Floats
 from ppafo.study.runs import FAILED, RunCounter, Runs, scenario_runs, settled
@@ -67,6 +68,18 @@ def test_a_study_that_resumes_counts_on_from_what_is_there() -> None:
     tally.add(30, 1)
     tally.add(30, 0)
     assert [(item.done, item.failed, item.earlier) for item in seen] == [(70, 3, 70), (100, 3, 70)]
+
+
+def test_every_run_of_an_ensemble_is_counted_once_with_one_thread_and_with_several() -> None:
+    base = load_scenario("torque-task-proportional", SHORT)
+    columns = {"valve.area": np.linspace(10e-6, 12e-6, 100)}
+    for threads in (1, 2):
+        ended: list[int] = []
+        run_ensemble(base, columns, ("rms_error",), threads=threads, count=ended.append)
+        assert sum(ended) == 100
+        ended.clear()
+        run_ensemble(base, columns, ("rms_error",), threads=threads, errors=True, count=ended.append)
+        assert sum(ended) == 100, "the second run of each, with finer steps, is no further run"
 
 
 def test_runs_that_fail_are_counted_with_the_first_reason() -> None:

@@ -9,7 +9,9 @@ import pytest
 
 from ppafo.engine import loading
 from ppafo.engine.cache.tidying import list_programs
+from ppafo.engine.compilers import CompilerError
 from ppafo.engine.lanes import Batch, load_program, run_batch
+from ppafo.engine.loading import load_generated
 from ppafo.engine.run import batch_of
 from ppafo.errors import SimulationError
 from ppafo.golden_bits import digest
@@ -86,3 +88,25 @@ def test_a_computer_without_a_compiler_says_what_to_install(
     monkeypatch.setenv("PPAFO_BACKEND", name)
     with pytest.raises(SimulationError, match=rf"PPAFO_BACKEND={name}: {missing}.*gcc or clang.*ppafo\[native\]"):
         load_program(batch_of(plan_run(load_scenario("torque-task-proportional", SHORT))).program)
+
+
+OBEYS = '#!/bin/sh\n[ "$1" = --version ] && echo "fake 1" && exit 0\n'
+BROKEN = {
+    "reported success but wrote no library": "exit 0\n",
+    "file too short": 'for word; do [ "$last" = -o ] && printf half > "$word"; last="$word"; done\n',
+    "it returned -9": "kill -9 $$\n",
+}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the compilers that fail are shell scripts")
+@pytest.mark.parametrize("reason", BROKEN)
+def test_a_compiler_that_fails_halfway_is_refused_and_leaves_nothing(
+    reason: str, fresh_cache: Path, tmp_path: Path
+) -> None:
+    broken = tmp_path / "gcc"
+    broken.write_text(OBEYS + BROKEN[reason], encoding="utf-8")
+    broken.chmod(0o755)
+    source = f"@entry('void(float64[:, ::1])')\ndef advance(x):\n    x[0, 0] = {len(reason)}.5\n"
+    with pytest.raises(CompilerError, match=reason):
+        load_generated(source, native.CCompiler("gcc", (str(broken),)))
+    assert list(fresh_cache.iterdir()) == []

@@ -78,6 +78,16 @@ def test_a_name_is_as_wide_as_what_it_holds() -> None:
     assert types(20) == {"value": INT16, "places": INT16, "": INT32}
 
 
+def test_a_product_that_is_no_power_of_two_is_refused() -> None:
+    with pytest.raises(ProgramError, match="a product must have a power of two as one factor"):
+        narrowed(module_of(product), given(0, 3, 3))
+
+
+def test_a_loop_that_is_too_long_is_refused() -> None:
+    with pytest.raises(ProgramError, match="at most 64 iterations"):
+        narrowed(module_of(doubled_up), given(0, 0, 65))
+
+
 @pytest.mark.parametrize("function", [doubled_up, chosen, paired])
 def test_no_value_is_ever_outside_of_its_range(function: Any) -> None:
     found = narrowed(module_of(function), given(-300, 200, 9)).returned

@@ -1,6 +1,8 @@
 """What cannot carry a comparison is refused in one line, or remarked on; never a silent wrong number."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ import pytest
 from ppafo.errors import DataError, PpafoError
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
-from ppafo.signals import Recording
+from ppafo.signals import Channel, Recording
 from ppafo.validation.measured import check_recording, read_measured
 from ppafo.validation.settings import ErrorLimit, parse_initial, parse_thresholds
 
@@ -24,6 +26,11 @@ def refused(recording: Recording, device: Device) -> str:
     assert text.startswith("bench.csv: ")
     assert "\n" not in text
     return text
+
+
+def renamed(recording: Recording, old: str, new: str) -> Recording:
+    channels = {new if name == old else name: channel for name, channel in recording.channels.items()}
+    return Recording(recording.label, recording.time, channels, recording.kind)
 
 
 def written(folder: Path, *lines: str) -> Path:
@@ -93,6 +100,37 @@ def test_an_unknown_channel_that_is_like_none_is_left_out_and_said(step: Step) -
     assert any("'room_temperature'" in remark for remark in check_recording(extra, device, "bench.csv").remarks)
 
 
+def test_a_recorded_supply_below_its_chambers_is_refused(step: Step) -> None:
+    device, recording = step
+    low = recording.with_channel("supply_pressure", np.full(len(recording), 3.0e5), "Pa")
+    assert "the recorded 'supply_pressure'" in refused(low, device)
+
+
+def test_an_angle_far_beyond_the_stops_is_refused_and_noise_at_a_stop_is_not(
+    step: Step, agree: Callable[..., Any]
+) -> None:
+    device, recording = step
+    assert agree(recording.with_channel("angle", recording["angle"] - 0.01, "rad"), device).model["angle"][0] == (
+        device.actuator.angle_min
+    )
+    for motion in ("free", "measured"):
+        with pytest.raises(DataError, match=r"'angle' is -20 deg, beyond the stops of ppafo2011, 20 to 130 deg"):
+            agree(recording.with_channel("angle", recording["angle"] - np.radians(40.0), "rad"), device, motion=motion)
+
+
+def test_a_reversed_angle_is_named_as_that(step: Step, agree: Callable[..., Any]) -> None:
+    device, recording = step
+    with pytest.raises(DataError, match="with the opposite sign all angles would lie between the stops"):
+        agree(recording.with_channel("angle", -recording["angle"], "rad"), device)
+
+
+def test_a_prescribed_vane_needs_its_angle(step: Step, agree: Callable[..., Any]) -> None:
+    device, recording = step
+    blind = renamed(recording, "angle", "knee_flexion")
+    with pytest.raises(DataError, match=r"needs a channel 'angle'"):
+        agree(blind, device, motion="measured")
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -123,3 +161,9 @@ def test_thresholds_are_shares_or_errors_and_are_given_once() -> None:
         parse_thresholds(["angle=1%", "angle = 2 deg"])
     with pytest.raises(DataError, match=r"^initial value 'angle=1 deg' and 'angle=2 deg' set the same value"):
         parse_initial(["angle=1 deg", "angle=2 deg"], 101325.0)
+
+
+def test_channels_need_values_to_compare(step: Step) -> None:
+    device, recording = step
+    bare = Recording("bare", recording.time, {"command": Channel(recording["command"], "-")})
+    assert "none of the channels to compare" in refused(bare, device)

@@ -1,5 +1,6 @@
 """Causes of a disagreement: each stage names the true one, and nothing is named that leaves more than noise."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -552,3 +553,15 @@ def test_the_nearest_cause_leaves_what_is_said_once_it_is_applied(bench: Recordi
         measured = check_recording(with_channel(wrong, "angle", 1.06 * wrong["angle"]), device, "r.csv")
         applied = compare_recording(measured, device, ReplaySettings())
         assert max(channel.in_noise for channel in applied.channels) == pytest.approx(cause.left, rel=1e-6)
+
+
+def test_a_common_delay_that_a_valve_may_have_is_in_the_verdict(bench: Recording) -> None:
+    device, settings = load_device("ppafo2011", overrides=[*SUPPLY, "valve.delay=12 ms"]), ReplaySettings()
+    agreement = compare_recording(check_recording(with_late_valve(bench), device, "r.csv"), device, settings)
+    assert agreement.passes
+    said = verdict(Validation("ppafo2011", device, (), settings, (agreement,), Diagnosis(is_noise=True)))
+    assert re.search(
+        r"a delay of 1\d(\.\d)? ms was removed, of the sensors or of the valve \(valve.delay = [23]\d", said
+    )
+    agreement = compare_recording(check_recording(bench, device, "r.csv"), load_device("ppafo2011"), settings)
+    assert "was removed" not in verdict(Validation("ppafo2011", device, (), settings, (agreement,), Diagnosis()))

@@ -218,6 +218,19 @@ def test_slow_samples_are_replayed_in_fine_steps(step: Step, agree: Agree) -> No
     assert max(shares(agreement).values()) < 1e-9
 
 
+def test_a_small_gap_is_remarked_on_and_does_not_count(step: Step, agree: Agree) -> None:
+    device, recording = step
+    kept = np.ones(len(recording), dtype=bool)
+    kept[250:258] = False
+    channels = {
+        name: Channel(recording[name][kept], recording.unit(name))
+        for name in ("angle", "pressure_1", "pressure_2", "command")
+    }
+    agreement = agree(Recording("gap", recording.time[kept], channels), device)
+    assert max(shares(agreement).values()) < 1e-3
+    assert any("gap in time" in remark for remark in agreement.remarks)
+
+
 def test_the_start_is_averaged_over_the_rest_before_the_first_command(agree: Agree) -> None:
     device = load_device("ppafo2011")
     count = 400

@@ -2,15 +2,20 @@
 
 import math
 import tomllib
+from dataclasses import replace
 from importlib import resources
+from pathlib import Path
 
 import jsonschema
 import pytest
 
-from ppafo.errors import ParameterError, ScenarioError
+from ppafo.errors import ArgumentError, ParameterError, ScenarioError
+from ppafo.gait import load_gait
+from ppafo.gait.document import gait_toml
 from ppafo.simulation.plan import plan_run
-from ppafo.walking import list_walks, load_walk
+from ppafo.walking import list_walks, load_walk, walk
 from ppafo.walking.declaration import json_schema
+from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import gait_sensors_of
 
 MISTAKES = {
@@ -57,3 +62,18 @@ def test_the_published_schema_accepts_the_shipped_walks_and_no_unknown_key() -> 
         jsonschema.validate(document, schema)
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate({**document, "wearers": {}}, schema)
+
+
+def test_force_sensors_need_a_gait_with_a_ground_reaction(tmp_path: Path) -> None:
+    bare = replace(load_gait(), name="bare", vertical_force=None, ankle_moment=None, centre_of_pressure=None)
+    path = tmp_path / "bare.toml"
+    path.write_text(gait_toml(bare))
+    with pytest.raises(ScenarioError, match="vertical_force"):
+        load_walk("solenoid", gait=path)
+    assert walk_of(load_walk("off", gait=path)).gait.name == "bare"
+
+
+@pytest.mark.parametrize("minutes", [-1.0, float("nan"), float("inf")])
+def test_what_is_no_number_of_minutes_is_refused(minutes: float) -> None:
+    with pytest.raises(ArgumentError, match=rf"^minutes={minutes}: "):
+        walk("solenoid", minutes=minutes)

@@ -7,7 +7,9 @@ from ppafo.errors import ParameterError, ScenarioError
 from ppafo.parameters.overrides import over
 from ppafo.walking import load_walk, walk
 from ppafo.walking.figures.bottle import bottle_figure
+from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
+from ppafo.walking.walk import without_device
 from tests.reference import bottle as independent
 
 WALK, BOTTLE = "solenoid-regulators", "paper-co2-9oz"
@@ -148,3 +150,11 @@ def test_a_mistake_is_named_in_one_line(override: str) -> None:
     with pytest.raises((ScenarioError, ParameterError), match=MISTAKES[override]) as caught:
         load_walk(WALK, over(["bottle.name=paper-co2-9oz"], [override]))
     assert "\n" not in str(caught.value)
+
+
+def test_many_wearers_and_an_energy_balance_have_no_bottle() -> None:
+    configuration = load_walk(WALK, bottle=BOTTLE)
+    changes = ["gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)"]
+    with pytest.raises(ScenarioError, match=r"gas_model\.kind.*omit gas_model\.kind, or the bottle"):
+        load_walk(WALK, [*changes, "gas_model.wall_area_per_volume=100 1/m"], bottle=BOTTLE)
+    assert walk_of(without_device(configuration)).bottle is None

@@ -56,6 +56,13 @@ def test_a_gait_may_stand_in_the_motion_or_above_and_not_in_both(tmp_path: Path)
         load_scenario(written(tmp_path, gait + text_of(NAME) + MOTION + gait))
 
 
+def test_an_override_means_the_same_under_either_path() -> None:
+    one, other = (load_scenario(NAME, [f"{path}=falisse2019-subject1"]) for path in ("gait", "motion.gait"))
+    assert walk_of(one) == walk_of(other)
+    with pytest.raises(ScenarioError, match=r"overrides 'gait=other' and 'motion\.gait=mine' set the same value"):
+        load_walk(NAME, ["motion.gait=mine"], gait="other")
+
+
 def test_a_gait_beside_a_file_in_another_folder_is_found_by_its_relative_path(tmp_path: Path) -> None:
     gait = (resources.files("ppafo") / "gait" / "normative" / "falisse2019-subject1.toml").read_text(encoding="utf-8")
     (tmp_path / "own.toml").write_text(gait)
@@ -81,6 +88,13 @@ MISTAKES: dict[str, tuple[str, str]] = {
     ),
     "a gait that is a number": ("gait = 3\n", "gait = 3 must be a text"),
 }
+
+
+@pytest.mark.parametrize("what", MISTAKES)
+def test_a_mistake_in_a_walk_is_one_line(what: str, tmp_path: Path) -> None:
+    added, message = MISTAKES[what]
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario(written(tmp_path, text_of(NAME) + MOTION + added))
 
 
 def test_the_schema_of_scenarios_takes_every_shipped_one_and_a_motion_that_is_a_walk() -> None:

@@ -193,3 +193,20 @@ def test_a_scenario_that_was_changed_in_python_is_not_changed_back_in_silence() 
     other = replace(scenario, name="longer", run=replace(scenario.run, duration=4.0))
     with pytest.raises(StudyError, match="'longer' was changed in Python"):
         compare([scenario, other], tasks={"slow": ["reference.ramp_time=2 s"]})
+
+
+def test_a_value_that_is_drawn_for_all_and_set_in_one_is_refused() -> None:
+    study = {
+        "schema_version": 1,
+        "name": "drawn",
+        "configurations": [{"name": "one", "scenario": "torque-task-proportional"}],
+        "vary": [{"path": "supply.pressure", "kind": "uniform", "minimum": "45 psi_g", "maximum": "55 psi_g"}],
+        "sample": {"method": "random", "runs": 8},
+        "outputs": {"metrics": ["rms_error"]},
+    }
+    pair = {
+        "one": ppafo.load_scenario("torque-task-proportional"),
+        "other": ppafo.load_scenario("torque-task-proportional", ["supply.pressure=60 psi_g"]),
+    }
+    with pytest.raises(StudyError, match=r"the study draws 'supply\.pressure' for every configuration"):
+        compare(pair, study=study, draws=32)

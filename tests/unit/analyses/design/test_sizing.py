@@ -238,6 +238,16 @@ def test_a_share_of_the_moment_of_a_wearer_is_a_profile(tmp_path: Path, name: st
     assert profile.table_error < 0.01 * profile.largest * most
 
 
+def test_a_profile_that_is_given_replaces_that_of_the_file_and_its_paths_count_from_here(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "ankle.csv").write_text("time [s],torque [N m]\n0,1\n0.5,2\n1,1\n")
+    assert load_design(folder / "trapezium.toml", profile="ankle.csv").profile.largest == 2.0
+    with pytest.raises(PpafoError, match="give it to load_design"):
+        design(load_design(folder / "trapezium.toml"), profile="ankle.csv")
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -58,6 +58,11 @@ def test_overrides_that_cannot_be_are_refused_in_one_line(override: str, words: 
     assert "\n" not in str(caught.value)
 
 
+def test_liquid_cannot_be_filled_by_pressure(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=r"give bottle.gas_mass instead"):
+        load_bottle(filled_by_pressure(tmp_path, 70.0))
+
+
 def test_gas_above_no_liquid_can_be_filled_by_pressure(tmp_path: Path) -> None:
     bottle = load_bottle(filled_by_pressure(tmp_path, 30.0))
     assert bottle.mass / bottle.volume == pytest.approx(66.0, rel=0.05)

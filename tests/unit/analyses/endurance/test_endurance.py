@@ -9,7 +9,7 @@ import pytest
 import ppafo
 from ppafo.analyses.endurance.discharge import Endurance, discharge, gas_of_recording
 from ppafo.analyses.endurance.question import bottle as endurance
-from ppafo.errors import ParameterError
+from ppafo.errors import DataError, ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.signals import Channel, Recording
 from ppafo.walking.bottle.coupling import Schedule
@@ -69,6 +69,17 @@ def test_a_narrow_regulator_ends_the_run_early_for_want_of_flow() -> None:
     assert "is too low to maintain the supply pressure" in lasting(0.3).message
 
 
+def test_a_flow_that_even_the_full_bottle_cannot_give_is_refused() -> None:
+    with pytest.raises(ParameterError, match=r"the full bottle passes at most .* g/s"):
+        lasting(0.3, "regulator.area=0.01 mm^2", peak=4.5e-3)
+
+
+def test_the_time_that_was_asked_for_ends_a_run_too() -> None:
+    made = lasting(0.1, schedule=Schedule(600.0, 0.0, 300.0))
+    assert made.ending == "time is up"
+    assert made.total_time == 300.0
+
+
 def test_rests_let_the_bottle_warm_up_and_give_more_steps() -> None:
     without, rested = lasting(0.5), lasting(0.5, schedule=Schedule(180.0, 900.0, 86400.0))
     assert rested.strides > 1.1 * without.strides
@@ -120,6 +131,26 @@ def test_a_little_gas_that_flows_back_into_the_line_is_taken_off() -> None:
     assert gas_of_recording(recording, None)[0] == pytest.approx(6e-4)
 
 
+@pytest.mark.parametrize(
+    ("recording", "stride_time", "words"),
+    [
+        (staircase(0.0, 2.2, 0.4), None, "would become empty"),
+        (staircase(6e-4, 2.2, 0.4), 3.0, "at most 2.2 s"),
+        (Recording("a", np.array([0.0, 1.0]), {"angle": Channel(np.zeros(2), "rad")}), None, "no channel"),
+        (
+            Recording("a", np.arange(3.0), {"supplied_mass": Channel(np.array([0.0, 2e-4, 1e-4]), "kg")}),
+            None,
+            "falls",
+        ),
+    ],
+)
+def test_recordings_that_say_nothing_of_a_gas_use_are_refused(
+    recording: Recording, stride_time: float | None, words: str
+) -> None:
+    with pytest.raises(DataError, match=words):
+        gas_of_recording(recording, stride_time)
+
+
 def test_the_verb_takes_recordings_one_or_several() -> None:
     one, two = staircase(1e-3, 1.0, 0.2), staircase(2e-3, 1.0, 0.2)
     alone = endurance(one)
@@ -131,6 +162,13 @@ def test_the_verb_takes_recordings_one_or_several() -> None:
     # Two walks of one scenario with other overrides have one name.
     alike = endurance([one, two], rest=60.0).found
     assert list(alike) == [one.label, f"{one.label} (2)"]
+
+
+def test_a_run_on_another_gas_than_the_bottle_holds_is_refused(tmp_path: Path) -> None:
+    ppafo.simulate("torque-task-proportional", ["gas.species=air"]).save(tmp_path / "task")
+    with pytest.raises(ppafo.DataError, match=r"uses gas of 28\.9. g/mol, but bottle 'paper-co2-9oz' contains CO2"):
+        ppafo.bottle(tmp_path / "task")
+    assert ppafo.bottle(tmp_path / "task", bottle="air-48ci-3000psi").found.walking_time > 0.0
 
 
 def test_the_regulator_of_a_bottle_is_set_to_the_supply_pressure_of_a_run_unless_it_is_stated(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import copy
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -17,7 +18,7 @@ import ppafo
 from ppafo.analyses.study_results import StudyResults
 from ppafo.errors import StudyError
 from ppafo.progress import Progress
-from ppafo.study.executing import computed_by
+from ppafo.study.executing import _computed, computed_by
 from tests.unit.analyses.sweep.test_run_study import contents
 
 PAIR = {"metrics": "rms_error", "configuration": "solenoid", "samples": 64}
@@ -64,6 +65,13 @@ def test_a_lost_block_is_submitted_again_and_given_up_in_the_end() -> None:
     pool.shutdown()
     with pytest.raises(StudyError, match="takes no more work"):
         list(computed_by(pool, abs, [-4]))
+
+
+def test_a_worker_of_another_version_and_a_study_that_cannot_be_sent_are_refused() -> None:
+    with pytest.raises(StudyError, match=f"a worker has ppafo {ppafo.__version__}, not 0.0.1; install the same"):
+        _computed(pickle.dumps(len), 1, "0.0.1", "")
+    with pytest.raises(StudyError, match="a class or function of the study cannot be sent to workers"):
+        list(computed_by(ThreadPoolExecutor(1), lambda block: block, [1]))
 
 
 CALLER = """

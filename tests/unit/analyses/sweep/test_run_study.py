@@ -17,6 +17,7 @@ from ppafo.errors import DataError, StudyError
 from ppafo.progress import Progress
 from ppafo.storage.files import LEFT_ASIDE
 from ppafo.studies.loading import load_study
+from ppafo.study import store
 from ppafo.study.blocks import chunks_of
 from ppafo.study.store import StudyFolder, chunk_file, compute_chunk, estimate_bytes
 
@@ -252,6 +253,22 @@ def test_a_study_whose_draws_were_changed_in_python_is_refused(small_results: St
     other = dataclasses.replace(study, sample=dataclasses.replace(study.sample, seed=study.sample.seed + 1))
     with pytest.raises(StudyError, match=r"drawn\.sample\.seed was 3 and is now 4"):
         sweep(other, out=small_results.folder.path)
+
+
+def test_more_disk_than_there_is_is_refused_before_anything_is_written(
+    small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(store, "free_bytes", lambda _: 1000)
+    with pytest.raises(StudyError, match=r"32 runs of 'small' need about .* MB, but only 0.001 MB are free"):
+        sweep(small, out=tmp_path / "out", agreed=True)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_large_study_asks_for_consent(small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store, "ASKED_ABOVE", 1000)
+    with pytest.raises(StudyError, match="give agreed to start the study"):
+        sweep(small, out=tmp_path / "out")
+    assert sweep(small, out=tmp_path / "out", agreed=True).found.summary["completed"] == 32
 
 
 def test_the_estimate_of_the_disk_is_near_and_above_what_is_written(

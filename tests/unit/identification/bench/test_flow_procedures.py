@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from ppafo.errors import IdentificationError
+from ppafo.errors import DataError, IdentificationError
 from ppafo.identification.bench.flow import GasAt, Opening, iso6358_shape, orifice_shape
 from ppafo.identification.bench.vane_leak import pressures_of_fall
 from ppafo.identification.noise import burg
@@ -102,6 +102,19 @@ def test_choked_flow_alone_is_refused_for_the_critical_ratio() -> None:
         open_valve_flow((planted.flow(ratios=(0.2, 0.3)),), planted.CO2, law="iso6358")
 
 
+def test_gauge_pressures_passed_for_absolute_are_refused() -> None:
+    source = planted.flow()
+    gauge = changed(source, "downstream_pressure", np.minimum(source.recording["downstream_pressure"] - 4e5, 0.0))
+    with pytest.raises(IdentificationError, match="at sample 1, which is impossible for an absolute pressure"):
+        open_valve_flow((gauge,), planted.CO2)
+
+
+def test_a_valve_that_was_never_open_is_told() -> None:
+    half = changed(planted.flow(), "command", np.full(60, 0.5))
+    with pytest.raises(IdentificationError, match="fully open"):
+        open_valve_flow((half,), planted.CO2)
+
+
 def test_planted_dead_band_saturation_and_hysteresis_come_back() -> None:
     result = valve_map((planted.sweep(),), planted.CO2)
     for path, truth, near in (
@@ -167,6 +180,41 @@ def test_the_zero_of_the_flow_meter_does_not_move_the_dead_band() -> None:
     assert found.low <= 0.12 <= found.high
 
 
+def test_a_valve_that_opens_more_in_one_direction_holds_for_this_model_only() -> None:
+    source = planted.sweep()
+    flow = source.recording["mass_flow"]
+    result = valve_map((changed(source, "mass_flow", np.where(flow > 0.0, 1.2 * flow, flow)),), planted.CO2)
+    assert result.conflict.startswith("commands to chamber 2, fitted alone, would have other values")
+
+
+def test_a_command_that_only_rises_leaves_hysteresis_out() -> None:
+    up = RecordingSource(planted.sweep().recording.between(0.0, 10.0))
+    result = valve_map((up,), planted.CO2)
+    assert "valve_map.hysteresis" not in [item.path for item in result.estimates]
+    assert any("the dead band includes half the width of any hysteresis" in remark for remark in result.remarks)
+
+
+def test_flow_with_the_wrong_sign_is_told() -> None:
+    with pytest.raises(IdentificationError, match="a wrong sign of 'mass_flow'"):
+        valve_map((planted.sweep(sign=-1.0),), planted.CO2)
+
+
+def test_a_valve_that_is_open_at_command_zero_is_told() -> None:
+    source = planted.sweep()
+    command, flow = source.recording["command"].copy(), source.recording["mass_flow"].copy()
+    nearest = np.argsort(np.abs(command))[:8]
+    command[nearest], flow[nearest] = 0.0, flow.max()
+    with pytest.raises(IdentificationError, match="at command 0, the valve has more than half of its largest flow"):
+        valve_map((changed(changed(source, "command", command), "mass_flow", flow),), planted.CO2)
+
+
+def test_a_command_in_percent_is_told() -> None:
+    source = planted.sweep()
+    percent = changed(source, "command", 100.0 * source.recording["command"])
+    with pytest.raises(DataError, match="must be from -1 to 1"):
+        valve_map((percent,), planted.CO2)
+
+
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_planted_orifice_leak_gives_its_area_whichever_chamber_empties(turned: bool) -> None:
     source, volumes = planted.leak("orifice", EFFECTIVE), (VOLUME, VOLUME / 1.3)
@@ -191,6 +239,13 @@ def test_a_leak_without_a_volume_is_an_area_over_it() -> None:
     area = found["vane_leak.area_over_volume"]
     assert area.low <= EFFECTIVE / VOLUME <= area.high
     assert "volume of chamber 1, which is not known" in area.explanation
+
+
+def test_gas_that_is_lost_outside_holds_for_this_model_only() -> None:
+    source = planted.leak("orifice", EFFECTIVE, lost=5000.0)
+    result = vane_leak((source,), planted.CO2, VOLUME, VOLUME / 1.3, discharge_coefficient=0.113)
+    assert result.conflict
+    assert result[AREA].verdict == "holds for this model only"
 
 
 @pytest.mark.parametrize("kind", ["leak", "steady"])
@@ -219,6 +274,14 @@ def test_gas_that_comes_to_rest_with_its_walls_is_no_leak() -> None:
     first = 4e5 * (1.0 + 0.01 * np.exp(-time / 12.0)) + np.random.default_rng(2).normal(0.0, 100.0, time.size)
     rests = planted.source("rests", time, pressure_1=(first, "Pa"), pressure_2=(np.full(time.size, 1e5), "Pa"))
     assert not vane_leak((rests,), planted.CO2, VOLUME).estimates[0].is_identified
+
+
+def test_decays_that_empty_different_chambers_are_refused() -> None:
+    source = planted.leak("orifice", EFFECTIVE)
+    first, second = source.recording["pressure_1"], source.recording["pressure_2"]
+    turned = changed(changed(source, "pressure_1", second), "pressure_2", first)
+    with pytest.raises(IdentificationError, match="chamber 1 empties in some recordings and chamber 2 in others"):
+        vane_leak((source, turned), planted.CO2, VOLUME, VOLUME)
 
 
 def test_a_steady_orifice_leak_gives_its_area_beside_the_zero_of_the_meter() -> None:

@@ -1,8 +1,11 @@
 """Free decay: the course of equation (1), planted damping and friction, and an inertia that may be unknown."""
 
+import math
+
 import numpy as np
 import pytest
 
+from ppafo.errors import IdentificationError
 from ppafo.identification.bench.free_decay import Slowing, course
 from ppafo.identification.source import RecordingSource
 from ppafo.identification.tolerances import Tolerances
@@ -98,6 +101,34 @@ def test_gravity_holds_for_this_model_only() -> None:
     assert free_decay((swing,), start="0 s", rise=0.0).conflict
 
 
+def swing_on_a_spring(
+    stiffness: float, duration: float, dynamic: float = 0.03, static: float = 0.03, noise: float = 0.05
+) -> RecordingSource:
+    """A vane of 8.4 g m^2 released at 30 deg on a spring, with 20 g m^2/s and two frictions [N m], read with noise.
+
+    Friction falls to its dynamic value at some 0.05 rad/s; where a swing ends within static friction the vane rests.
+    """
+    time, step = np.arange(0.0, duration, 1e-3), 5e-5
+    at, rate, swing = math.pi / 6.0, 0.0, np.empty(time.size)
+    for number in range(20 * time.size):
+        if number % 20 == 0:
+            swing[number // 20] = at
+        friction = dynamic + (static - dynamic) / (1.0 + (rate / 0.05) ** 2)
+        against = math.copysign(friction, rate or -at)
+        after = rate - step * (stiffness * at + 20e-3 * rate + against) / 8.4e-3
+        if after * rate < 0.0 or rate == 0.0:
+            after = 0.0 if abs(stiffness * at) <= static else after
+        at, rate = at + 0.5 * step * (rate + after), after
+    random = np.random.default_rng(7).normal(0.0, math.radians(noise), time.size)
+    return planted.source("spring.csv", time, angle=(0.5 * math.pi + swing + random, "rad"))
+
+
+@pytest.mark.parametrize(("stiffness", "duration"), [(2.0, 3.0), (0.5, 3.0), (2.0, 12.0)])
+def test_a_swing_on_a_spring_is_no_decay(stiffness: float, duration: float) -> None:
+    with pytest.raises(IdentificationError, match=r"turns back at 0\.\d+ s without coming to rest"):
+        free_decay((swing_on_a_spring(stiffness, duration),), inertia="8.4 g m^2")
+
+
 def test_a_vane_that_a_hand_turns_back_after_a_rest_is_a_decay() -> None:
     source = planted.decay(deceleration=0.8)
     time = source.recording.time
@@ -122,3 +153,9 @@ def test_a_recorded_velocity_makes_the_interval_narrower_and_it_holds() -> None:
     alone, both = (free_decay((one,), rise=0.0)[path] for one in (planted.decay(), with_velocity()))
     assert both.wider_half_width < 0.8 * alone.wider_half_width
     assert both.low <= planted.DAMPING_RATE <= both.high
+
+
+@pytest.mark.parametrize(("factor", "shown"), [(57.29578, "57.3 times"), (-1.0, "-1 times")])
+def test_a_velocity_in_another_unit_or_direction_is_refused(factor: float, shown: str) -> None:
+    with pytest.raises(IdentificationError, match=f"'angular_velocity' is {shown} the derivative of 'angle'"):
+        free_decay((with_velocity(factor),))

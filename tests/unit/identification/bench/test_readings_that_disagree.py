@@ -1,11 +1,13 @@
 """A repetition or a recording that disagrees is flagged by its name, and a grossly wrong reading is named."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from ppafo.errors import IdentificationError
 from ppafo.identification.bench.law import BenchResult
 from ppafo.identification.source import RecordingSource
 from ppafo.signals.recording import Floats
@@ -21,6 +23,7 @@ RESPONSES = {
     "steady": "mass_flow",
     "static": "torque",
 }
+OVER_TIME = ("decay", "leak")
 
 
 @pytest.fixture
@@ -72,6 +75,66 @@ def test_a_recording_of_another_gain_is_named_with_its_file(solved: dict[str, So
     assert solved[kind]((*right[:2], wrong)).conflict.startswith(
         "recording 3 (third.csv), fitted alone, would have other values"
     )
+
+
+@pytest.mark.parametrize("kind", RESPONSES)
+def test_a_reading_of_ten_times_its_value_is_named_before_a_fit(solved: dict[str, Solve], kind: str) -> None:
+    name, source = RESPONSES[kind], made(kind, 5)
+    values = source.recording[name].copy()
+    # Neither about zero nor at the ends.
+    at = int(np.flatnonzero(np.abs(values) > 0.5 * np.abs(values).max())[9])
+    values[at] *= 10.0
+    wrong = changed(source, name, values)
+    if kind in OVER_TIME:
+        assert_close(solved[kind]((wrong,)), solved[kind]((source,)), f"left out: 1 of .* samples where '{name}'")
+        return
+    with pytest.raises(IdentificationError, match=f"'{name}' is .* at sample {at + 1}, but .* around it"):
+        solved[kind]((wrong,))
+
+
+def assert_close(found: BenchResult, right: BenchResult, said: str) -> None:
+    assert re.match(said, found.remarks[0])
+    for one, other in zip(found.estimates, right.estimates, strict=True):
+        assert one.value == pytest.approx(other.value, abs=other.high - other.value)
+
+
+@pytest.mark.parametrize("kind", OVER_TIME)
+def test_one_sample_in_a_hundred_that_is_wrong_is_left_out_and_one_in_twenty_refused(
+    solved: dict[str, Solve], kind: str
+) -> None:
+    name, source = RESPONSES[kind], made(kind, 5)
+    values = source.recording[name].copy()
+    places = np.arange(40, values.size - 40, 100)
+    values[places] += 2.0 * np.ptp(values) * (-1.0) ** places
+    said = f"left out: {places.size} of .* samples where '{name}' .* the first is sample 41"
+    assert_close(solved[kind]((changed(source, name, values),)), solved[kind]((source,)), said)
+    values[10::20] *= 30.0
+    with pytest.raises(IdentificationError, match=f"'{name}' is .*: a wrong reading, and so are samples"):
+        solved[kind]((changed(source, name, values),))
+
+
+@pytest.mark.parametrize("share", [0.005, 0.2])
+def test_a_step_of_the_converter_near_rest_is_no_wrong_reading(solved: dict[str, Solve], share: float) -> None:
+    source = made("leak", 5)
+    room = np.full(len(source.recording), 101_325.0)
+    room[:: int(1.0 / share)] += 250.0
+    remarks = solved["leak"]((changed(source, "pressure_2", room),)).remarks
+    assert any("is treated as a reservoir" in remark for remark in remarks)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [("static", "pressure_difference"), ("flow", "upstream_pressure"), ("sweep", "downstream_pressure")],
+)
+def test_a_pressure_of_ten_times_its_value_is_named_before_a_fit(
+    solved: dict[str, Solve], kind: str, name: str
+) -> None:
+    source = made(kind, 5)
+    values = source.recording[name].copy()
+    at = int(np.argsort(values)[values.size // 2])
+    values[at] *= 10.0
+    with pytest.raises(IdentificationError, match=f"'{name}' is .* at sample {at + 1}, but .* around it"):
+        solved[kind]((changed(source, name, values),))
 
 
 def test_friction_that_grows_with_the_root_of_the_pressure_holds_for_this_model_only() -> None:

@@ -84,6 +84,46 @@ def test_a_direction_that_is_turned_round_is_told_and_not_fitted() -> None:
         static_torque((planted.static(sign=-1.0),))
 
 
+def test_one_pressure_is_too_few() -> None:
+    source = planted.static()
+    two = np.where(source.recording["pressure_difference"] > 3e5, 6e5, 1e5)
+    with pytest.raises(IdentificationError, match="3 different pressures or more, not 2"):
+        static_torque((changed(source, "pressure_difference", two),))
+
+
+def test_the_jitter_of_one_commanded_pressure_is_no_range_of_pressures() -> None:
+    source = planted.static()
+    pressure = source.recording["pressure_difference"]
+    jitter = 5.0e5 + 1.2e4 * (pressure / pressure.max())
+    with pytest.raises(IdentificationError, match=r"not 1; pressures closer than 7\.4.* psi \(10 %.*count as one"):
+        static_torque((changed(source, "pressure_difference", jitter),))
+
+
+@pytest.mark.parametrize("amplitude", [0.3e3, 0.9e3])
+def test_jitter_about_no_pressure_is_no_range_of_pressures(amplitude: float) -> None:
+    source = planted.static()
+    pressure = source.recording["pressure_difference"]
+    jitter = amplitude * (2.0 * pressure / pressure.max() - 1.0)
+    with pytest.raises(IdentificationError, match=r"not 1; pressures closer than 0\.3 psi \(\[bench\] zero_of_pre"):
+        static_torque((changed(source, "pressure_difference", jitter),))
+
+
+@pytest.mark.parametrize("higher", np.linspace(1.5e5, 6.0e5, 10).tolist())
+def test_jitter_of_the_second_pressure_is_no_third_one(higher: float) -> None:
+    source = planted.static()
+    pressure = source.recording["pressure_difference"]
+    jitter = 0.04 * higher * (pressure / pressure.max())
+    two = np.where(np.arange(pressure.size) % 2 == 0, 1.0e5 + 0.1 * jitter, higher + jitter)
+    with pytest.raises(IdentificationError, match="3 different pressures or more, not 2"):
+        static_torque((changed(source, "pressure_difference", two),))
+
+
+def test_a_friction_that_falls_with_pressure_is_not_called_identified() -> None:
+    result = static_torque((planted.static(growth=-1.0e-6),))
+    assert result[GROWTH].verdict == "holds for this model only"
+    assert "as if pressure loosened the seal" in result.conflict
+
+
 @pytest.mark.parametrize(
     ("load", "moves", "slope", "friction"),
     [

@@ -117,6 +117,14 @@ def test_a_number_that_does_nothing_is_not_identifiable_and_says_so(experiment: 
     assert found["foot_plate.inertia"].verdict == "identified"
 
 
+def test_a_bound_that_keeps_the_truth_out_is_named(experiment: FittedExperiment) -> None:
+    found = fitted(experiment, FLOW, FitNumber("foot_plate.inertia", start=0.012, low=0.010, high=0.02))
+    inertia = found["foot_plate.inertia"]
+    assert inertia.verdict == "at its bound"
+    assert "at or beyond 0.01 kg m^2" in inertia.explanation
+    assert inertia.value == pytest.approx(0.010, rel=1e-6)
+
+
 def test_a_model_that_lacks_something_holds_for_itself_only(experiment: FittedExperiment) -> None:
     loaded = load_scenario(
         "step-response", ["motion.kind=free", "run.duration=0.35 s", "foot_plate.gravity_torque=0.4 N m"]
@@ -161,6 +169,26 @@ def test_a_number_limited_to_one_recording_leaves_the_other_alone(
     high, less = (estimate.value for estimate in found.estimates)
     assert high == pytest.approx(number_at(step, "supply.pressure"), rel=1e-3)
     assert less == pytest.approx(number_at(low, "supply.pressure"), rel=1e-3)
+
+
+@pytest.mark.short
+@pytest.mark.parametrize("is_right", [True, False], ids=["right model", "model that lacks a torque"])
+def test_a_fit_ends_at_the_same_numbers_from_several_starts(experiment: FittedExperiment, is_right: bool) -> None:
+    """To a hundredth of each interval, also beside static friction, which trades off against its fall."""
+    paths = ["valve.discharge_coefficient"]
+    starts = [(0.10,), (0.13,)]
+    if is_right:
+        paths += ["foot_plate.inertia", "friction.static_torque"]
+        starts = [(0.10, 0.010, 0.6), (0.3, 0.0042, 1.0), (0.12, 0.012, 0.35)]
+    lacking = ["motion.kind=free", "run.duration=0.35 s", "foot_plate.gravity_torque=0.4 N m"]
+    scenario = experiment.scenario if is_right else load_scenario("step-response", lacking)
+    fits = [
+        fitted(dataclasses.replace(experiment, scenario=scenario), *map(FitNumber, paths, start)) for start in starts
+    ]
+    ends = np.array([[(one.value, one.low, one.high) for one in found.estimates] for found in fits])
+    widths = (ends[:, :, 2] - ends[:, :, 1]).min(axis=0)
+    assert np.all(np.ptp(ends, axis=0) < 0.01 * widths[:, None])
+    assert {one.verdict == "holds for this model only" for found in fits for one in found.estimates} == {not is_right}
 
 
 def test_a_cylinder_is_fitted_as_a_vane_is(recorded: Callable[..., Recording]) -> None:

@@ -9,6 +9,7 @@ from ppafo.identification.trajectory.experiment import (
     TIME_OFFSET,
     FittedExperiment,
     TrajectoryProblem,
+    broken_rule,
     declared_numbers,
     full_path,
     number_at,
@@ -49,6 +50,21 @@ def test_a_parameter_that_makes_no_sense_is_refused(
 ) -> None:
     with pytest.raises(IdentificationError, match=message):
         problem(experiment, parameter)
+
+
+def test_the_same_parameter_twice_is_refused(experiment: FittedExperiment) -> None:
+    with pytest.raises(IdentificationError, match="given twice"):
+        problem(experiment, FitNumber("valve.area"), FitNumber("valves.proportional.area"))
+
+
+def test_every_parameter_that_0_leaves_out_of_the_model_is_refused_before_the_fit(experiment: FittedExperiment) -> None:
+    late, spool = FitNumber("valve.delay"), FitNumber("valve.spool_frequency", start=30.0, low=0.0)
+    words = r"0 leaves it out of the model, so it cannot be fitted from there; start and low must be above 0"
+    with pytest.raises(
+        IdentificationError, match=rf"\(1\) valve\.delay: {words}; \(2\) valve\.spool_frequency: {words}$"
+    ):
+        problem(experiment, late, INERTIA, spool)
+    problem(experiment, FitNumber("valve.delay", start=0.015, low=0.001))
 
 
 def test_samples_on_the_grid_are_taken_from_the_record_as_they_are(experiment: FittedExperiment) -> None:
@@ -105,3 +121,23 @@ def test_a_time_offset_belongs_to_the_recording_and_leaves_the_scenario_alone(st
 def test_the_chosen_valve_has_the_path_that_a_parameter_set_has(step: Scenario) -> None:
     assert full_path("valve.area", step) == "valves.proportional.area"
     assert number_at(step, "valve.area") == number_at(step, "valves.proportional.area") == pytest.approx(31.6e-6)
+
+
+def test_dynamic_friction_above_static_friction_is_named(step: Scenario) -> None:
+    assert broken_rule(step.device) == ""
+    above = with_numbers(step, {"friction.dynamic_torque": 0.5})
+    static = step.device.friction.static_torque
+    assert f"fitted to 0.5 N m, above friction.static_torque of {static:.3g} N m" in broken_rule(above.device)
+
+
+def test_a_clipped_channel_is_called_so_and_not_without_noise(experiment: FittedExperiment) -> None:
+    values = np.array(experiment.recording["pressure_1"])
+    random = np.random.default_rng(0)
+    level = float(np.quantile(values, 0.1))
+    clipped = np.minimum(values + 300.0 * random.standard_normal(values.size), level)
+    recording = experiment.recording.with_channel("pressure_1", clipped, "Pa")
+    without = dataclasses.replace(experiment, recording=recording, noise={"angle": 1e-3, "pressure_2": 500.0})
+    with pytest.raises(
+        IdentificationError, match=r"stays at its largest value for .* the sensor is probably saturated"
+    ):
+        prepare(without, {})

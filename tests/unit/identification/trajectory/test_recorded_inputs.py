@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from ppafo.errors import IdentificationError
+from ppafo.errors import DataError, IdentificationError
 from ppafo.identification.fit import FitNumber
 from ppafo.identification.tolerances import DEFAULTS
 from ppafo.identification.trajectory.experiment import (
@@ -143,6 +143,36 @@ def test_the_same_recording_in_two_experiments_is_refused_and_two_parts_of_it_ar
         TrajectoryProblem((FLOW,), (experiment, late))
     early = dataclasses.replace(experiment, recording=experiment.recording.between(0.0, 0.3))
     assert len(TrajectoryProblem((FLOW,), (early, late)).experiments) == 2
+
+
+def test_a_supply_that_is_followed_cannot_be_fitted_too(experiment: FittedExperiment) -> None:
+    followed = with_input(experiment, "supply_pressure", np.full(len(experiment.recording), 4.0e5), "Pa")
+    with pytest.raises(IdentificationError, match="uses the recorded 'supply_pressure'"):
+        TrajectoryProblem((FitNumber("supply.pressure"),), (followed,))
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "unit", "message"),
+    [
+        ("command", 1.5, "-", "'command' is 1.5 in sample 1; it must be from -1 to 1"),
+        ("supply_pressure", 2.0e4, "Pa", "far below atmospheric pressure"),
+    ],
+)
+def test_an_input_that_cannot_be_is_refused(
+    experiment: FittedExperiment, name: str, values: float, unit: str, message: str
+) -> None:
+    followed = with_input(experiment, name, np.full(len(experiment.recording), values), unit)
+    with pytest.raises(DataError, match=message):
+        TrajectoryProblem((INERTIA,), (followed,))
+
+
+def test_a_gap_in_an_input_is_refused(experiment: FittedExperiment) -> None:
+    whole = with_input(experiment, "command", np.ones(len(experiment.recording)), "-")
+    time = whole.recording.time.copy()
+    time[100:] += 0.2
+    broken = dataclasses.replace(whole, recording=dataclasses.replace(whole.recording, time=time))
+    with pytest.raises(DataError, match=r"experiment 'step': there is a gap of 0\.201 s"):
+        TrajectoryProblem((INERTIA,), (broken,))
 
 
 @pytest.mark.parametrize("off", [1.8, 1.0 / 1.8])

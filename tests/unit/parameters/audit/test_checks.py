@@ -84,6 +84,17 @@ def test_torque_constant_and_volume_that_agree_are_no_finding() -> None:
     assert "the shaft gets 61.7 % of the work p dV of the gas" in stated.paragraph
 
 
+def test_dead_volume_makes_the_volumes_positive() -> None:
+    short = "actuator.dead_volume_2=2 cm^3"
+    assert findings("reported.largest_angle=150 deg", short)["volume-2"].severity == "error"
+    assert "volume-2" not in findings("reported.largest_angle=150 deg")
+
+
+def test_chamber_1_is_checked_at_the_lower_end() -> None:
+    finding = findings("reported.smallest_angle=0 deg", "actuator.dead_volume_1=2 cm^3")["volume-1"]
+    assert side(finding, "V1 at the end of the range") == pytest.approx(2e-6 - 14.51e-6 * 20 / 57.29578, rel=1e-6)
+
+
 def test_a_demand_above_the_ceiling_is_a_warning_with_the_pressure_that_is_needed() -> None:
     finding = findings("reported.demanded_torque=6 N m")["torque-ceiling"]
     assert finding.severity == "warning"
@@ -126,6 +137,13 @@ def test_a_value_that_no_device_can_have_is_an_error() -> None:
     finding = findings("actuator.restitution=1.5")["range-of-actuator-restitution"]
     assert finding.severity == "error"
     assert "lower limit: 0; upper limit: 1" in finding.paragraph
+
+
+def test_a_solenoid_without_an_opening_delay_is_named_and_one_with_it_is_not() -> None:
+    finding = findings()["ideal-opening"]
+    assert finding.severity == "warning"
+    assert finding.title == "solenoid: no opening_delay, so that a coil opens its valve at once"
+    assert "ideal-opening" not in findings("valves.solenoid.opening_delay=9 ms")
 
 
 def test_a_set_with_almost_nothing_in_it_has_nothing_to_say_but_what_is_missing() -> None:
@@ -179,10 +197,25 @@ def test_a_torque_of_walking_has_to_come_within_a_push_off() -> None:
     assert side(small, "time to fill") == pytest.approx(side(findings()[name], "time to fill") * share, rel=0.01)
 
 
+def test_choked_filling_takes_the_time_of_the_closed_formula() -> None:
+    low = ("reported.walking_torque=3 N m", "actuator.dead_volume_1=2 cm^3")
+    mass = 0.9 * 3.0 / 1.451e-5 * (2e-6 + 14.51e-6 * 1.5708) / (8.314 / 0.044 * 298.0)
+    flow = 0.113 * 12.6e-6 * 0.002812 * (101325.0 + 90 * 6894.757)
+    found = findings(*low)["walking-torque-in-time-solenoid"]
+    assert side(found, "time to fill") == pytest.approx(mass / flow, rel=2e-3)
+
+
 def test_a_vane_that_turns_further_than_its_actuator_is_a_warning() -> None:
     found = findings()["rotation"]
     assert [side.value for side in found.sides] == pytest.approx([math.radians(110.0), math.radians(90.0)])
     assert "rotation" not in findings("reported.largest_angle=110 deg")
+
+
+def test_an_area_that_is_the_bore_of_a_tube_is_noted() -> None:
+    found = findings()
+    assert side(found["bore-of-solenoid"], "bore of 4 mm") == pytest.approx(12.566e-6, rel=1e-4)
+    assert side(found["bore-of-proportional"], "bore of 1/4 inch") == pytest.approx(31.669e-6, rel=1e-4)
+    assert "bore-of-proportional" not in findings("valve.area=30 mm^2")
 
 
 def with_key(path: str, key: str) -> list[AuditFinding]:
