@@ -7,7 +7,7 @@ from pathlib import Path
 
 from benchmarks.report import Line, Target
 from benchmarks.timing import Timing, run_python
-from ppafo.engine.cache.folder import CACHE_VARIABLE
+from ppafo.engine.cache import CACHE_VARIABLE
 
 GROUP = "Command line, from start to end of the process"
 ENTRY = ("-c", "import sys; from ppafo.cli.main import main; sys.exit(main())")

@@ -4,18 +4,19 @@ They lie in a folder of the session, under the hash of what they are made of and
 where a compiler refuses, it does so again. Their time counts apart (``costs.py``).
 """
 
+import contextlib
+import fcntl
 import hashlib
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
 
-from ppafo.engine.cache.making import one_process
 from tests.costs import BUILT
 
 FOLDER = "PPAFO_TEST_BUILDS"
@@ -42,6 +43,14 @@ def pytest_runtest_setup() -> None:
     for module in filter(None, map(sys.modules.get, BUILDERS)):
         if not hasattr(module.asked, "is_once"):
             module.asked = _asked_once(module.asked)
+
+
+@contextlib.contextmanager
+def one_process(path: Path) -> Iterator[None]:
+    """Let one process build while others wait."""
+    with path.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 def once(ingredients: Sequence[object], build: Callable[[], bytes]) -> Path:

@@ -13,7 +13,7 @@ import pytest
 
 from ppafo import plugins
 from ppafo.analyses.reproduce.paper import Reproduction, reproduce_paper
-from ppafo.engine.cache import kept
+from ppafo.engine import cache
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 
@@ -22,7 +22,7 @@ pytest_plugins = ("tests.costs", "tests.built_once", "tests.quickly_compiled", "
 
 def pytest_configure() -> None:
     """Let no model be watched by coverage while it is compiled."""
-    kept.execute = _unwatched(kept.execute)
+    cache.execute = _unwatched(cache.execute)
 
 
 def _unwatched(run: Callable[..., ModuleType]) -> Callable[..., ModuleType]:

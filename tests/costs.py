@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 
-from ppafo.engine.cache import kept
+from ppafo.engine import loading
 
 RECORDED = Path(__file__).with_name("costs.toml")
 LONG = 2.0
@@ -91,7 +91,7 @@ def pytest_configure(config: pytest.Config) -> None:
     """Let models count apart, and gather the costs where the session is led."""
     config.addinivalue_line("markers", "long: `make test-all` alone runs it")
     config.addinivalue_line("markers", "short: `make test` runs it too, whatever it costs")
-    kept.RequestedProgram.compile = counted(kept.RequestedProgram.compile)  # type: ignore[method-assign]
+    loading.load_or_compile = counted(loading.load_or_compile)
     if not hasattr(config, "workerinput"):
         config.pluginmanager.register(Table(config), "table of costs")
 

@@ -44,7 +44,7 @@ def doctor(
     Exit code 1 where a run has other bits than on every other computer.
 
     warm: compile the models of the scenarios of the package
-    clear: remove all compiled models, and try each compiler again
+    clear: remove all compiled models
     programs: list the compiled models one by one, with their sizes and when each was last used
     bits: run each scenario and walk of the package for a moment, and compare every bit with those it has elsewhere
     schema: print the JSON Schema of a file format instead, such as scenario
@@ -52,8 +52,7 @@ def doctor(
     >>> print(doctor(schema="study").text.splitlines()[1])
       "$schema": "https://json-schema.org/draft/2020-12/schema",
     """
-    from ppafo.engine.cache import tidying
-    from ppafo.engine.cache.folder import cache_folder, refusal
+    from ppafo.engine import cache
     from ppafo.engine.loading import compilers_to_try
 
     requests = {"--warm": warm, "--clear": clear, "--bits": bits, "--schema": schema, "--programs": programs}
@@ -76,9 +75,9 @@ def doctor(
         lines += [f"  {name}: different bits; please report scenario, computer and compiler" for name in others]
         code = EXIT_CHECK_FAILED if others else EXIT_GOOD
         return CommandOutput("\n".join(lines), {"compiler": compiler, "same_bits": is_equal}, "bits", code)
-    folder = cache_folder()
-    cleared = tidying.clear(folder) if clear and folder is not None else 0
-    why_not = "" if clear else refusal(folder)
+    folder = cache.cache_folder()
+    cleared = cache.clear(folder) if clear and folder is not None else 0
+    why_not = "" if clear else cache.refusal(folder)
     if warm:
         if why_not:
             raise SimulationError(f"--warm: compiled models cannot be stored: {why_not}")
@@ -91,17 +90,19 @@ def doctor(
 
 def _models(folder: Path | None, why_not: str, freed: dict[str, int], one_by_one: bool) -> CommandOutput:
     """Return compilers and compiled models of a cache folder; ``why_not`` is the reason not to use it, or ""."""
-    from ppafo.engine.cache.tidying import LONGEST_UNUSED, MAXIMUM_BYTES, list_left_out, list_programs, list_texts
+    from ppafo.engine.cache import LONGEST_UNUSED, MAXIMUM_BYTES, PROGRAM, entries
     from ppafo.engine.loading import compilers_to_try
 
-    programs, now = [] if folder is None else list_programs(folder), time.time()
+    kept = [] if folder is None else entries(folder)
+    programs = [entry for entry in kept if entry.path.name.startswith(PROGRAM)]
+    now = time.time()
+    size = sum(program.size for program in programs)
     document: dict[str, Any] = {
         "compilers": [compiler.name for compiler in compilers_to_try()],
         "folder": None if folder is None else str(folder),
         "not_used": why_not or None,
-        "size": sum(program.size for program in programs),
-        "made_from_programs": 0 if folder is None else sum(text.size for text in list_texts(folder)),
-        "left_out": {} if folder is None else list_left_out(folder),
+        "size": size,
+        "made_from_programs": sum(entry.size for entry in kept) - size,
         "kept_unused_days": LONGEST_UNUSED / _DAY,
         "most_bytes": MAXIMUM_BYTES,
         "programs": [
@@ -123,7 +124,6 @@ def _models(folder: Path | None, why_not: str, freed: dict[str, int], one_by_one
         # One day or several by the number as it is shown, which is rounded.
         ago = "today" if days < 1.0 else f"{days:.0f} day{'' if int(days + 0.5) == 1 else 's'} ago"
         lines.append(f"  {item['name']}  {_megabytes(item['size']):>8}  last used {ago}")
-    lines += [f"compiler left out for a day: {name}: {why}" for name, why in document["left_out"].items()]
     limits = f"{document['kept_unused_days']:.0f} days unused, or above {_megabytes(document['most_bytes'])} in all"
     return CommandOutput("\n".join([*lines, f"removed automatically: after {limits}"]), document, "doctor")
 

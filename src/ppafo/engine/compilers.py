@@ -26,14 +26,11 @@ class Effort(StrEnum):
 
 
 class CompilerError(SimulationError):
-    """Error of a compiler that does not work on this computer for any program; ``names`` are all compilers affected.
+    """Error of a compiler that does not work on this computer for any program; ``names`` are all compilers affected."""
 
-    ``passing`` marks a temporary cause, such as a full disk.
-    """
-
-    def __init__(self, problem: str, *names: str, passing: bool = False) -> None:
+    def __init__(self, problem: str, *names: str) -> None:
         super().__init__(problem)
-        self.names, self.passing = names, passing
+        self.names = names
 
 
 class UntranslatableError(ProgramError):

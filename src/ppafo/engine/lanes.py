@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 import ppafo.engine.step.loop  # noqa: F401 - its numbers are in the key of a text, whether one is written or not
 from ppafo import interrupts
-from ppafo.engine.cache.texts import kept_bytes
+from ppafo.engine.cache import kept_bytes
 from ppafo.engine.compilers import Effort
 from ppafo.engine.entries import INLINE
 from ppafo.engine.groups import Role, check_rows
 from ppafo.engine.lane_rows import VECTOR, lanes_of
-from ppafo.engine.loading import HOW_TO_INSTALL, compiled, compilers_to_try
+from ppafo.engine.loading import HOW_TO_INSTALL, compile_together, compiled, compilers_to_try
 from ppafo.engine.package_key import package_key
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import MadeFrom, SourceCollector
@@ -138,10 +138,8 @@ def load_programs(programs: Iterable[tuple[Program, Effort]]) -> None:
     different = dict.fromkeys(programs)
     compilers = compilers_to_try() if len(different) > 1 else ()
     if compilers:
-        from ppafo.engine.cache.making import load_all  # most runs have one program
-
         sources = [(current_source("lanes", program, write_source), effort) for program, effort in different]
-        load_all(sources, compilers[0], compiled)
+        compile_together(sources, compilers[0])
 
 
 def current_source(kind: str, parts: Any, write: Any) -> str:

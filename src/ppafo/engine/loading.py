@@ -2,8 +2,8 @@
 
 ``PPAFO_BACKEND`` selects one compiler, or Python; by default gcc, clang and zig are tried in this order, fastest code
 first. Results are bit-identical. A compiler that does not work, because headers are missing or its libraries cannot be
-loaded, is reported in one line and skipped for a day; after a kill or a full disk, only in the present process. If no
-compiler is left, or a law cannot be translated to C, Python runs the text, and one line reports this.
+loaded, is reported in one line and left out in this process. If no compiler is left, or a law cannot be translated to
+C, Python runs the text, and one line reports this.
 """
 
 import contextlib
@@ -11,14 +11,12 @@ import logging
 import os
 import sys
 import threading
-import time
 from collections.abc import Iterable
+from contextvars import copy_context
 from functools import cache, lru_cache
-from pathlib import Path
 from types import ModuleType
 
-from ppafo.engine.cache.folder import CACHE_VARIABLE, LEFT_OUT_FOR, NOTE, cache_folder, refusal
-from ppafo.engine.cache.kept import RequestedProgram, is_kept, load_kept_module, short_hash
+from ppafo.engine.cache import announce, cache_folder, is_kept, load_or_compile, program_name, refusal
 from ppafo.engine.compilers import OFFERED, Compiler, CompilerError, Effort, UntranslatableError
 from ppafo.errors import ProgramError, SimulationError
 from ppafo.wording import nearest_name, one_line
@@ -44,12 +42,12 @@ def compilers_to_try() -> tuple[Compiler, ...]:
 
     Raises SimulationError if ``PPAFO_BACKEND`` names an unknown compiler, or one that this computer does not have.
     """
-    return _compilers(os.environ.get(BACKEND_VARIABLE, ""), cache_folder())
+    return _compilers(os.environ.get(BACKEND_VARIABLE, ""))
 
 
 @lru_cache(maxsize=8)
-def _compilers(name: str, folder: Path | None) -> tuple[Compiler, ...]:
-    """Return the compilers to try: the named compiler, or those of this computer without a recorded failure.
+def _compilers(name: str) -> tuple[Compiler, ...]:
+    """Return the compilers to try: the named compiler, or those of this computer that have not failed.
 
     Raises SimulationError for an unknown name, and if any C compiler was requested and none is available.
     """
@@ -65,7 +63,7 @@ def _compilers(name: str, folder: Path | None) -> tuple[Compiler, ...]:
     for make in OFFERED.values():
         with contextlib.suppress(SimulationError):
             compilers.append(make())
-    working = tuple(compiler for compiler in compilers if not _has_failed(compiler, folder))
+    working = tuple(compiler for compiler in compilers if compiler.identity() not in _FAILED)
     if name and not compilers:
         raise SimulationError(f"{BACKEND_VARIABLE}={name}: no C compiler was found: {HOW_TO_INSTALL}")
     # The last one is kept even if it failed, so that its own error is what the user reads.
@@ -90,31 +88,41 @@ def load_generated(source: str, compiler: Compiler) -> ModuleType:
     Raises ProgramError if the source cannot be compiled, with the source file of the faulty function, and CompilerError
     if the compiler does not work.
     """
-    program = RequestedProgram(source, compiler)
+    name = program_name(source, compiler)
     # A second thread must not get a module of which only the beginning has run.
-    with _LOADING.setdefault(program.name, threading.RLock()):
-        if program.name in sys.modules:
-            return sys.modules[program.name]
-        cache = cache_folder()
-        # Loading runs what lies there, so the folder is looked at each time, not once for the process.
-        why_not = refusal(cache)
-        folder = None if cache is None or why_not else program.folder_in(cache)
-        if folder is None:
-            logger.warning("ppafo: compiled models are not cached: %s; change %s", why_not, CACHE_VARIABLE)
-        module = None if folder is None else load_kept_module(folder, program)
-        if module is not None:
-            return module
-        from ppafo.engine.cache.making import make  # most programs are there
+    with _LOADING.setdefault(name, threading.RLock()):
+        return sys.modules[name] if name in sys.modules else load_or_compile(source, compiler)
 
-        return make(program, folder)
+
+def compile_together(programs: Iterable[tuple[str, Effort]], compiler: Compiler) -> None:
+    """Compile the missing ones of some texts, each with its effort, in parallel, if there are two or more.
+
+    A single missing program is compiled where it is needed, with its own message.
+    """
+    missing = [
+        (source, effort)
+        for source, effort in dict.fromkeys(programs)
+        if not (is_kept(source, compiler) or is_kept(source, compiler.with_effort(effort)))
+    ]
+    if len(missing) < 2:
+        return
+    from concurrent.futures import ThreadPoolExecutor
+
+    folder = cache_folder()
+    where = "not kept" if refusal(folder) else f"kept in {folder}"
+    workers = min(len(missing), os.cpu_count() or 1)
+    with announce(where, len(missing)), ThreadPoolExecutor(workers) as pool:
+        started = [pool.submit(copy_context().run, compiled, source, effort) for source, effort in missing]
+        for task in started:
+            task.result()
 
 
 @lru_cache(maxsize=64)
 def _load_by(source: str, compilers: tuple[Compiler, ...], effort: Effort) -> ModuleType | None:
     """Return the module of a text compiled by the first working compiler; None if there is none.
 
-    The only place that recovers from a failed compiler: it is left out for a day, and the next one is tried. If the
-    compiler named by ``PPAFO_BACKEND`` fails, raises SimulationError, or ProgramError for a law without C.
+    The only place that recovers from a failed compiler: it is left out, and the next one is tried. If the compiler
+    named by ``PPAFO_BACKEND`` fails, raises SimulationError, or ProgramError for a law without C.
     """
     if not compilers:
         return None
@@ -130,10 +138,10 @@ def _load_by(source: str, compilers: tuple[Compiler, ...], effort: Effort) -> Mo
             raise SimulationError(f"{failure}; {WITHOUT_C}") from failure
         with _LEAVING_OUT:
             if compiler.identity() not in _FAILED:  # another thread may have found it at the same time
-                until = "in this run" if failure.passing else "for a day, or until 'ppafo doctor --clear'"
                 instead = f"compiled by {left[0].name}" if left else "run by Python, some hundred times slower,"
-                logger.warning("ppafo: %s; models are %s instead %s", failure, instead, until)
-            _leave_out(failed, failure)
+                logger.warning("ppafo: %s; models are %s instead", failure, instead)
+            _FAILED.update(other.identity() for other in failed)
+            _compilers.cache_clear()
         return _load_by(source, left, effort)
     except UntranslatableError as refused:
         if os.environ.get(BACKEND_VARIABLE):
@@ -147,28 +155,3 @@ def _load_by(source: str, compilers: tuple[Compiler, ...], effort: Effort) -> Mo
 def _say_slow(why: str) -> None:
     """Log once per process why Python runs a model."""
     logger.warning("ppafo: %s: Python runs the model, some hundred times slower than compiled", why)
-
-
-def _leave_out(failed: Iterable[Compiler], failure: CompilerError) -> None:
-    """Record the failure of compilers, in this process and, for a lasting cause, in the cache folder."""
-    folder = cache_folder()
-    for compiler in failed:
-        _FAILED.add(compiler.identity())
-        if folder is not None and not failure.passing and not refusal(folder):
-            with contextlib.suppress(OSError):
-                (folder / note_name(compiler)).write_text(f"{failure}\n", encoding="utf-8")
-    _compilers.cache_clear()
-
-
-def note_name(compiler: Compiler) -> str:
-    """Return the name of the cache file with the reason why a compiler does not work on this computer."""
-    return f"{NOTE}{compiler.name}-{short_hash(compiler.identity())}"
-
-
-def _has_failed(compiler: Compiler, folder: Path | None) -> bool:
-    if folder is None or compiler.identity() in _FAILED:
-        return compiler.identity() in _FAILED
-    try:
-        return time.time() - (folder / note_name(compiler)).lstat().st_mtime < LEFT_OUT_FOR
-    except OSError:
-        return False

@@ -24,7 +24,7 @@ from ppafo.model.binding import frame_of, parts_of
 COMPOSED = ("control", "engine", "metrics", "model", "processor", "signals")
 """Subpackages with functions that become part of a program text, or that compose the text."""
 _WRITING = (
-    *("ppafo.engine.cache.", "ppafo.engine.generator", "ppafo.engine.loop_", "ppafo.engine.reduction"),
+    *("ppafo.engine.cache", "ppafo.engine.generator", "ppafo.engine.loop_", "ppafo.engine.reduction"),
     "ppafo.translation.",
 )
 """Modules that write or store texts. A process loads them only for a text that is not stored yet, so that a key with

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.arguments import Overrides, checked
-from ppafo.engine.cache.texts import kept_bytes
+from ppafo.engine.cache import kept_bytes
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports import filled, template
 from ppafo.exports.c_library import library_of

@@ -22,16 +22,6 @@ LONGEST_COMPILING = 300.0
 # Between two looks at an interrupt while a compiler runs [s].
 _PAUSE = 0.25
 _INTERRUPTED = (-signal.SIGINT, -signal.SIGTERM)
-_PASSING = (
-    "no space left",
-    "quota exceeded",
-    "temporary file",
-    "cannot allocate memory",
-    "out of memory",
-    "killed signal",
-    "cache directory",
-)
-"""Fragments of compiler messages, in lower case, that mean a temporary lack of resources."""
 
 
 def asked(
@@ -116,8 +106,6 @@ def compile_library(source: str, library: Path, command: Sequence[str], flags: S
         # By the same key as this process: the compiler works all the same.
         raise SimulationError(f"the compiler {name} was interrupted; try again")
     if done.returncode != 0:
-        # Killed, or without room for its files: the compiler itself is sound and may work the next time.
-        passing = done.returncode < 0 or any(sign in done.stderr.casefold() for sign in _PASSING)
-        raise CompilerError(f"{name} does not compile a model: {complaint(done)}", passing=passing)
+        raise CompilerError(f"{name} does not compile a model: {complaint(done)}")
     if not library.is_file():
         raise CompilerError(f"the compiler {name} reported success but wrote no library; check its installation")

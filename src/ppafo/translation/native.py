@@ -83,7 +83,7 @@ class CCompiler:
                 fill_module(module, library, parameters_of(source))
         except OSError as error:
             problem = f"the output of {self.name} cannot be written to a temporary folder: {reason(error)}"
-            raise CompilerError(problem, passing=True) from error
+            raise CompilerError(problem) from error
 
     def run_text(self, source: str, path: str, module: ModuleType) -> None:
         """Load the library next to ``path`` and add its entries to the module."""

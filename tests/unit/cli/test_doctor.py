@@ -12,7 +12,7 @@ from ppafo import golden_bits
 from ppafo.cli import doctor
 from ppafo.cli.main import completion_script, main
 from ppafo.engine import loading
-from ppafo.engine.cache.tidying import list_programs
+from ppafo.engine.cache import entries
 from ppafo.engine.loading import load_generated
 from ppafo.loading import load_scenario
 from ppafo.simulation import simulate
@@ -50,7 +50,7 @@ def test_cache_says_why_a_folder_is_not_used(fresh_cache: Path, capsys: pytest.C
 def test_model_that_was_compiled_for_later_is_the_one_that_a_run_uses(fresh_cache: Path) -> None:
     simulate.compile_models([load_scenario("torque-task-proportional")])
     simulate.simulate(load_scenario("torque-task-proportional", ["run.duration=10 ms"]))
-    assert not [kept for kept in list_programs(fresh_cache) if "_quick_" in kept.path.name]
+    assert not [path for path, _, _ in entries(fresh_cache) if "_quick_" in path.name]
 
 
 def test_bits_are_compared_with_the_golden_ones_and_another_is_named(

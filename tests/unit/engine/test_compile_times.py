@@ -8,13 +8,11 @@ from types import ModuleType
 
 import pytest
 
-from ppafo.engine import loading
-from ppafo.engine.cache import making
-from ppafo.engine.cache.making import announce, load_all
-from ppafo.engine.cache.tidying import list_programs
+from ppafo.engine import cache, loading
+from ppafo.engine.cache import announce, entries
 from ppafo.engine.compilers import Effort
 from ppafo.engine.lanes import Batch, effort_for
-from ppafo.engine.loading import load_generated
+from ppafo.engine.loading import compile_together, load_generated
 from ppafo.golden_bits import plain_batch
 from tests.compilers_here import ScriptCompiler
 
@@ -23,11 +21,11 @@ QUICK = "answer = {}\n"
 
 @pytest.fixture(autouse=True)
 def _soon(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(making, "QUIET", 0.05)
+    monkeypatch.setattr(cache, "QUIET", 0.05)
 
 
 def test_models_that_are_needed_together_are_compiled_side_by_side_with_one_message(
-    fresh_cache: Path, caplog: pytest.LogCaptureFixture
+    fresh_cache: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     compiler, together = ScriptCompiler(), threading.Barrier(2, timeout=60.0)
     sources = [QUICK.format(number) for number in (time.time(), 2.5, 3.5)]
@@ -41,11 +39,12 @@ def test_models_that_are_needed_together_are_compiled_side_by_side_with_one_mess
         loaded.append(source)
         return load_generated(source, compiler)
 
-    load_all([(source, Effort.FULL) for source in (*sources, sources[0])], compiler, load)
+    monkeypatch.setattr(loading, "compiled", load)
+    compile_together([(source, Effort.FULL) for source in (*sources, sources[0])], compiler)
     assert set(loaded) == {sources[0], sources[2]}
     assert caplog.messages[:1] == ["ppafo: compiling 2 models for this computer ..."]
     assert len(caplog.messages) == 2
-    assert len(list_programs(fresh_cache)) == 3
+    assert len(entries(fresh_cache)) == 3
 
 
 def test_a_quick_program_is_made_only_where_the_full_one_is_not_kept(
@@ -55,7 +54,7 @@ def test_a_quick_program_is_made_only_where_the_full_one_is_not_kept(
     first, second = (QUICK.format(time.time() + number) for number in range(2))
 
     def made() -> list[str]:
-        return sorted(kept.path.name.split("_")[2] for kept in list_programs(fresh_cache))
+        return sorted(kept.path.name.split("_")[2] for kept in entries(fresh_cache))
 
     loading.compiled(first, Effort.QUICK)
     assert made() == ["quick"]

@@ -47,7 +47,7 @@ def test_a_process_that_has_written_one_text_finds_the_next_under_the_key_of_a_p
         "program = plain_batch('proportional').program",
         "words = package_key(program).words",
         "write_source(program)",
-        "[importlib.import_module(f'ppafo.{name}') for name in ('engine.cache.making', 'translation.native_source')]",
+        "[importlib.import_module(f'ppafo.{name}') for name in ('engine.cache', 'translation.native_source')]",
         "print(package_key(program).words == words)",
     )
     run = subprocess.run([sys.executable, "-c", "\n".join(lines)], check=True, capture_output=True, text=True)
