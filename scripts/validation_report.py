@@ -216,7 +216,7 @@ SECTIONS: Mapping[str, Mapping[str, Check]] = {
         "fmu": tested("FMUs, FMI 2.0 and 3.0", "FMPy and its checker", "tests/unit/exports/test_fmu.py"),
         "platforms": tested("FMUs for other computers", "Wine, QEMU", "tests/unit/exports/test_fmu_platforms.py"),
         "page": tested("The page that simulates", "Chromium; Python", "tests/unit/page"),
-        "firmware": tested("The controller on its processor", "mspdebug", "tests/unit/exports/test_firmware.py"),
+        "firmware": tested("The controller on its processor", "mspdebug", "tests/unit/processor/test_firmware.py"),
     },
     "Identification and statistics": {
         "real": tested(

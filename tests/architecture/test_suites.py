@@ -36,6 +36,17 @@ def test_the_recorded_files_and_tests_are_there() -> None:
         assert [name for name in cost.long if f"def {name}(" not in text] == []
 
 
+def test_every_folder_of_unit_tests_is_a_package_or_module_and_every_package_has_unit_tests() -> None:
+    unit = ROOT / "tests" / "unit"
+    source = ROOT / "src" / "ppafo"
+    folders = {path.parent.relative_to(unit) for path in unit.rglob("test_*.py")}
+    strangers = [f for f in folders if not (source / f).is_dir() and not (source / f).with_suffix(".py").is_file()]
+    assert strangers == []
+    packages = {path.parent.name for path in source.glob("*/__init__.py")}
+    untested = [name for name in packages if not (unit / name).is_dir() and not (unit / f"test_{name}.py").is_file()]
+    assert untested == []
+
+
 def test_drawn_tests_draw_the_same_every_time_and_may_be_slow() -> None:
     assert settings().derandomize
     assert settings().deadline is None

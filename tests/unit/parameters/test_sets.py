@@ -1,6 +1,6 @@
 """The parameter sets that come with the package."""
 
-from ppafo.parameters import load_device, load_parameter_set
+from ppafo.parameters import load_parameter_set
 
 COMPLETED = load_parameter_set("ppafo2011")
 PRINTED = load_parameter_set("ppafo2011-printed")
@@ -24,8 +24,3 @@ def test_the_volumes_of_the_completed_set_are_fitted_and_have_an_uncertainty_and
     assert {COMPLETED.numbers[path].origin for path in VOLUMES} == {"derived"}
     assert all(COMPLETED.numbers[path].uncertainty for path in VOLUMES)
     assert PRINTED.numbers["actuator.displacement_per_radian"].value == 51.0
-
-
-def test_the_shaft_gets_all_that_the_gas_does() -> None:
-    actuator = load_device("ppafo2011").actuator
-    assert actuator.displacement_per_radian == actuator.torque_constant == 14.51e-6

@@ -37,17 +37,6 @@ def test_pressure_is_that_of_both_unless_the_second_is_given_apart(
     assert supply.dorsiflexion_pressure == pytest.approx(psi(second), rel=1e-12)
 
 
-def test_override_on_top_of_a_file_with_both_alike_moves_both() -> None:
-    alike = apply_overrides(
-        load_parameter_set("ppafo2011"), ["supply.pressure=55 psi_g", "supply.dorsiflexion_pressure=55 psi_g"]
-    )
-    moved = build_device(apply_overrides(alike, ["supply.pressure=70 psi_g"])).supply
-    assert moved.dorsiflexion_pressure == moved.pressure == pytest.approx(psi(70.0), rel=1e-12)
-    own = ["supply.dorsiflexion_pressure=55 psi_g", "supply.pressure=70 psi_g"]
-    kept = build_device(apply_overrides(alike, own)).supply
-    assert (kept.pressure, kept.dorsiflexion_pressure) == pytest.approx((psi(70.0), psi(55.0)), rel=1e-12)
-
-
 def test_one_pressure_in_two_units_is_one() -> None:
     alike = apply_overrides(
         load_parameter_set("ppafo2011"), ["supply.pressure=50 psi_g", "supply.dorsiflexion_pressure=446.06286 kPa_a"]

@@ -21,13 +21,6 @@ def names(folder: Path) -> list[str]:
     return sorted(entry.name for entry in folder.iterdir())
 
 
-def test_a_folder_holds_both_recordings_the_document_and_the_attachments(tmp_path: Path) -> None:
-    folder = write_result(tmp_path / "new" / "task", recording(), DOCUMENT, {"figure.png": b"png"})
-    assert names(folder) == ["figure.png", "recording.csv", "recording.nc", "run.json"]
-    assert names(folder.parent) == ["task"]
-    assert (folder / "figure.png").read_bytes() == b"png"
-
-
 def test_a_folder_is_read_back_exactly_from_either_file(tmp_path: Path) -> None:
     folder = write_result(tmp_path / "task", recording(), DOCUMENT, {})
     stored = read_stored(folder)
