@@ -40,13 +40,11 @@ def test_both_styles_of_header_are_read(tmp_path: Path, head: str, said: int) ->
     ("text", "message"),
     [
         (NEW.replace("endheader\n", "") + ROWS, "has no line 'endheader': the header is cut off"),
-        ("Walk\nnRows=3\n", "has no line 'endheader'"),
         (NEW.partition("time")[0], "has nothing after 'endheader': the file is cut off"),
         (NEW, "has labels but no rows"),
         (NEW + ROWS.rpartition("0.02")[0], "has 2 rows, but the header states 3: the file is cut off or was edited"),
         (OLD + ROWS + "0.03 1 1\n", "has 4 rows, but the header states 3"),
         (NEW.replace("nRows=3", "nRows=three") + ROWS, "line 3: nRows is 'three', not a whole number"),
-        (NEW.replace("nColumns=3", "nColumns=4") + ROWS.replace("\t.5", ""), "line 10 has 2 values for 3 columns"),
         (
             NEW.replace("inDegrees=yes", "inDegrees=maybe") + ROWS,
             "line 5: inDegrees is 'maybe'; it must be 'yes' or 'no'",
@@ -57,7 +55,6 @@ def test_both_styles_of_header_are_read(tmp_path: Path, head: str, said: int) ->
         ),
         (NEW.replace("time\t", "frame\t") + ROWS, "line 7: the first column must be 'time', not 'frame'"),
         (NEW + ROWS.replace("\n 0.01", "\n\n 0.01"), "line 9 has 0 values for 3 columns"),
-        (NEW + ROWS.replace("-1.6", "1,6"), "line 9, column 'knee_angle_r': '1,6' is not a finite number"),
         (NEW + ROWS.replace("-1.7", "1e999"), "line 10, column 'knee_angle_r': '1e999' is not a finite number"),
         (NEW + ROWS.replace("\t.5", ""), "line 10 has 2 values for 3 columns"),
         (NEW + ROWS.replace("0.01", "0.00"), "line 9, column 'time': the clock stands still: 0 s follows 0 s"),

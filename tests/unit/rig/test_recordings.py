@@ -217,7 +217,6 @@ def test_bad_input_is_one_line_with_the_nearest_name(words: dict[str, object], m
     [
         ("friction_scatter", "friction_scater", "did you mean 'friction_scatter'"),
         ('"-8 K"', '"-8 m"', "bench.gas_difference"),
-        ("effects.stribeck.velocity", "effects.stribek.velocity", "did you mean 'stribeck'"),
     ],
 )
 def test_a_mistake_in_a_preset_file_is_named(before: str, after: str, message: str, tmp_path: Path) -> None:

@@ -61,19 +61,6 @@ def problem_after(old: str, new: str, kind: type[PpafoError] = ScenarioError) ->
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "key", "nearest"),
-    [
-        ("[controller]", "[controler]", "controler", "controller"),
-        ("proportional_gain", "proportionl_gain", "controller.proportionl_gain", "proportional_gain"),
-        ("angle =", "angel =", "motion.angel", "angle"),
-        ("valve =", "valvee =", "device.valvee", "valve"),
-    ],
-)
-def test_a_misspelt_key_is_answered_with_the_nearest(old: str, new: str, key: str, nearest: str) -> None:
-    assert f"unknown key '{key}', did you mean '{nearest}'?" in problem_after(old, new)
-
-
-@pytest.mark.parametrize(
     ("old", "new", "nearest"),
     [
         ('"pid"', '"pdi"', "controller.kind = 'pdi' is not known, did you mean 'pid'?"),

@@ -134,7 +134,6 @@ def test_a_prescribed_vane_needs_its_angle(step: Step, agree: Callable[..., Any]
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("angel=10%", "did you mean 'angle'"),
         ("angle=10 psi_d", "an angle is needed"),
         ("pressure_1=3 psi_g", "a pressure difference is needed"),
         ("pressure_1=3 psi", "needs the kind of pressure"),
@@ -142,8 +141,6 @@ def test_a_prescribed_vane_needs_its_angle(step: Step, agree: Callable[..., Any]
         ("3 deg", "a plain number without a unit"),
         ("0.1", "must be in %"),
         ("angle=-5%", "must be above 0"),
-        ("angle=0%", "must be above 0"),
-        ("", "does not start with a number"),
     ],
 )
 def test_a_bad_threshold_is_refused(text: str, words: str) -> None:

@@ -229,8 +229,6 @@ def copied(results: StudyResults, tmp_path: Path) -> Path:
             lambda study: study["vary"][1].update(maximum="70 psi_g"),
             r"study.vary.supply.pressure.maximum was '60 psi_g' and is now '70 psi_g'",
         ),
-        (lambda study: study.update(name="other"), "study.name was 'small' and is now 'other'"),
-        (lambda study: study.update(runs_of_chunk=6), "runs_of_chunk was 5 and is now 6"),
         (
             lambda study: study["configurations"][0].update(overrides=["run.duration=0.2 s", "valve.area=9 mm^2"]),
             r"configurations.proportional.overrides was .* and is now .*valve.area=9",

@@ -84,13 +84,6 @@ def test_a_direction_that_is_turned_round_is_told_and_not_fitted() -> None:
         static_torque((planted.static(sign=-1.0),))
 
 
-def test_one_pressure_is_too_few() -> None:
-    source = planted.static()
-    two = np.where(source.recording["pressure_difference"] > 3e5, 6e5, 1e5)
-    with pytest.raises(IdentificationError, match="3 different pressures or more, not 2"):
-        static_torque((changed(source, "pressure_difference", two),))
-
-
 def test_the_jitter_of_one_commanded_pressure_is_no_range_of_pressures() -> None:
     source = planted.static()
     pressure = source.recording["pressure_difference"]
