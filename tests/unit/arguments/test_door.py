@@ -11,7 +11,9 @@ import xarray
 
 import ppafo
 from ppafo.arguments import Count, Fraction, Mass, Overrides, Point, Threads, Word, checked
+from ppafo.cli.main import main
 from ppafo.errors import ArgumentError, DataError, StudyError
+from ppafo.wording import argument_text
 
 TASK = "torque-task-proportional"
 
@@ -138,3 +140,14 @@ def test_an_error_about_the_content_of_an_argument_begins_with_its_name_and_keep
         ppafo.simulate(Path("nowhere.toml"))
     with pytest.raises(ppafo.ParameterError, match=r"^there is no parameter set 'nowhere'"):
         ppafo.audit("nowhere")
+
+
+def test_a_message_names_arguments_in_python_and_options_on_the_command_line(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(ppafo.ParameterError, match=r"gas_per_stride='0.3 g'$"):
+        ppafo.bottle()
+    assert main(["bottle"]) == 2
+    assert "--gas-per-stride '0.3 g'" in capsys.readouterr().err
+    # A command leaves nothing behind for a caller in Python.
+    assert argument_text("peak_flow") == "peak_flow"

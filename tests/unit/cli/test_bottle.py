@@ -3,22 +3,12 @@
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.signals import Channel, Recording
-from ppafo.storage.comma_separated import read_csv, write_csv
+from ppafo.storage.comma_separated import read_csv
 
 QUICK = ["bottle", "--gas-per-stride", "1 g", "--stride-time", "1.1 s"]
-
-
-@pytest.fixture
-def walk(tmp_path: Path) -> Path:
-    """A recording of 4 s in which 2 g are taken evenly."""
-    time = np.linspace(0.0, 4.0, 101)
-    recording = Recording("walk", time, {"supplied_mass": Channel(time * 5e-4, "kg")}, kind="simulated")
-    return write_csv(tmp_path / "walk.csv", recording)
 
 
 def test_json_is_in_si_and_says_simulated(capsys: pytest.CaptureFixture[str]) -> None:
@@ -29,15 +19,6 @@ def test_json_is_in_si_and_says_simulated(capsys: pytest.CaptureFixture[str]) ->
     assert document["bottle"]["values"]["bottle.gas_mass"]["source"] == "override"
     assert document["walking_time"] == pytest.approx(1.1 * document["strides"])
     assert "CoolProp" in document["bottle"]["properties"]
-
-
-def test_a_recording_is_repeated(walk: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["bottle", str(walk), "--stride-time", "2 s", "--json"]) == 0
-    repeated = json.loads(capsys.readouterr().out)
-    assert repeated["mass_per_stride"] == pytest.approx(1e-3)
-    assert main(["bottle", "--gas-per-stride", "1 g", "--stride-time", "2 s", "--json"]) == 0
-    given = json.loads(capsys.readouterr().out)
-    assert repeated["strides"] == pytest.approx(given["strides"], rel=1e-6)
 
 
 def test_the_folder_has_all_files_and_is_made_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

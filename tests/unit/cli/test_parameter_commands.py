@@ -16,12 +16,6 @@ def test_a_set_is_shown_with_the_source_of_every_value(capsys: pytest.CaptureFix
     assert row.split() == ["valves.proportional.area", "12.6", "mm^2", "assumed", "override"]
 
 
-def test_the_audit_fails_on_the_printed_set_and_passes_on_the_completed_one(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["sets", "audit", "ppafo2011-printed"]) == 1
-    assert "ppafo2011-printed: 9 errors" in capsys.readouterr().out
-    assert main(["sets", "audit", "ppafo2011"]) == 0
-
-
 def test_the_audit_takes_overrides_and_prints_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["sets", "audit", "ppafo2011", "--json", "--set", "friction.static_torque=9 N m"]) == 1
     document = json.loads(capsys.readouterr().out)

@@ -116,18 +116,6 @@ def test_gauge_pressure_of_a_bench_and_of_a_walk_counts_from_the_atmosphere_of_t
     assert main(["export", "figure", str(tmp_path / "walk")]) == 2
 
 
-def test_a_damaged_result_is_one_line_and_exit_code_2(
-    saved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for name in FILES:
-        (tmp_path / name).write_bytes((saved / name).read_bytes())
-    (tmp_path / "recording.nc").write_bytes((saved / "recording.nc").read_bytes()[:5000])
-    assert main(["export", "figure", str(tmp_path)]) == 2
-    error = capsys.readouterr().err
-    assert "recording.nc: is not the file that was written" in error
-    assert error.count("\n") == 1
-
-
 def test_a_diverged_run_is_written_and_told_on_the_side_with_exit_code_1(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

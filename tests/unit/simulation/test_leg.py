@@ -144,11 +144,6 @@ def test_a_shank_with_corners_is_refused_in_one_line() -> None:
         on_leg({"kind": "ramp_hold", "level": "10 deg"})
 
 
-def test_one_override_takes_the_leg_off() -> None:
-    scenario = on_leg(AT_REST, "motion.kind=free")
-    assert scenario.motion == FreeMotion(math.radians(60.0))
-
-
 KNOTS = ((0.0, 1.0), (0.2, 3.0), (0.3, 2.5), (0.9, -1.0))
 
 

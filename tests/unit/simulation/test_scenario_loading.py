@@ -102,14 +102,6 @@ def test_words_stand_for_the_pressures_of_the_device() -> None:
     assert supply.pressure > supply.dorsiflexion_pressure
 
 
-def test_gauge_pressure_counts_from_the_atmosphere_of_the_device() -> None:
-    scenario = small(
-        device={"set": "ppafo2011", "overrides": ["supply.atmospheric_pressure=90 kPa_a"]},
-        initial={"pressure_1": "0 psi_g"},
-    )
-    assert scenario.initial.pressure_1 == scenario.initial.pressure_2 == 9.0e4
-
-
 def test_a_rate_and_its_period_are_the_same_sampling() -> None:
     by_rate = small(controller={"kind": "on_off", "rate": "20 Hz"})
     by_period = small(controller={"kind": "on_off", "period": "50 ms"})

@@ -234,13 +234,6 @@ def test_only_a_controller_that_follows_nothing_may_be_without_a_reference() -> 
     assert parse_scenario(without.encode(), "task.toml", words).reference.settings == {"level": 5.0}
 
 
-def test_wrong_values_of_several_tables_are_in_one_refusal() -> None:
-    changes = ["run.duration=3 m", "sensors.delay=1 m", "sensors.pressure_noise=2 deg", "reference.level=3 psi_g"]
-    with pytest.raises(ScenarioError) as caught:
-        load_scenario("torque-task-proportional", changes)
-    assert [change in part for change, part in zip(changes, caught.value.parts, strict=True)] == [True] * 4
-
-
 @pytest.mark.parametrize(
     ("changes", "overrides", "said"),
     [
