@@ -54,11 +54,6 @@ def test_values_keep_their_provenance() -> None:
     assert entry.uncertainty == 0.5
 
 
-def test_an_unknown_name_is_answered_with_the_nearest_one() -> None:
-    with pytest.raises(ParameterError, match="no parameter set 'ppafo2012', did you mean 'ppafo2011'"):
-        load_parameter_set("ppafo2012")
-
-
 @pytest.mark.parametrize("name", ["mhj.10", "MHJ 10", "", "Ventil-größer"])
 def test_a_name_of_a_valve_that_no_path_can_hold_is_refused(name: str) -> None:
     said = f"the name {name!r} must consist of letters, digits, '-' and '_'"

@@ -10,6 +10,7 @@ import pytest
 from ppafo.engine.lanes import run_batch, write_source
 from ppafo.engine.run import TOO_MANY_PARTS, batch_of, state_row_numbers
 from ppafo.engine.step import loop
+from ppafo.errors import SimulationError
 from ppafo.model.sensors import Measurement
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import COMPLETED, DIVERGED, run_ensemble
@@ -220,6 +221,27 @@ def test_a_chamber_that_is_driven_far_above_its_supply_completes() -> None:
     result = simulate("step-response", ["motion.kind=free", "actuator.dead_volume_1=1 cm^3", *driven])
     assert result.status.is_completed
     assert result.recording["pressure_1"].max() > 3.0 * result.scenario.device.supply.pressure
+
+
+class WithASlip:
+    """A controller with an attribute or a name that is not there."""
+
+    def __init__(self, attribute: bool) -> None:
+        self.attribute = attribute
+
+    def reset(self) -> None:
+        pass
+
+    def update(self, time: float, reference: float, measurement: Measurement) -> float:
+        return float(measurement.torqe if self.attribute else refernce)  # type: ignore[attr-defined, name-defined]  # noqa: F821
+
+
+@pytest.mark.parametrize(("attribute", "nearest"), [(False, "reference"), (True, "torque")])
+def test_a_slip_in_a_controller_is_one_line_with_its_file_and_line(attribute: bool, nearest: str) -> None:
+    scenario = load_scenario("torque-task-proportional", ["run.duration=0.1 s"])
+    said = rf"test_simulate\.py, line \d+: WithASlip: .*, did you mean '{nearest}'\?$"
+    with pytest.raises(SimulationError, match=said):
+        simulate(scenario.controlled_by(WithASlip(attribute)))
 
 
 def test_a_weight_below_0_pulls_the_other_way() -> None:

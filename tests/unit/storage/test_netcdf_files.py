@@ -76,3 +76,13 @@ def test_what_a_channel_declares_between_its_samples_is_an_attribute(tmp_path: P
     supply = Channel(np.array([4.0e5, 5.0e5]), "Pa", "hold")
     declared = Recording("bench", np.array([0.0, 1.0]), {"supply_pressure": supply})
     assert read_netcdf(written(tmp_path, declared)) == declared
+
+
+def test_a_channel_of_two_dimensions_is_refused(tmp_path: Path) -> None:
+    import xarray
+
+    path = tmp_path / "two.nc"
+    made = xarray.Dataset({"angle": (("time", "y"), np.zeros((2, 3)))}, {"time": ("time", [0.0, 1.0], {"units": "s"})})
+    made.to_netcdf(path, engine="h5netcdf")
+    with pytest.raises(DataError, match="'angle' must be numeric and one-dimensional over 'time'"):
+        read_netcdf(path)

@@ -111,3 +111,14 @@ def test_a_recording_that_changed_on_disk_is_refused_before_it_is_opened(tmp_pat
     (folder / "recording.nc").write_bytes(damaged)
     with pytest.raises(DataError, match=r"recording\.nc: is not the file that was written with run\.json"):
         read_stored(folder)
+
+
+@pytest.mark.parametrize(
+    "content",
+    ["{", "[]", '{"format": "ppafo result", "schema_version": 99}', '{"format": "ppafo result", "schema_version": 1}'],
+)
+def test_a_document_of_another_kind_or_version_is_refused(tmp_path: Path, content: str) -> None:
+    folder = write_result(tmp_path / "task", recording(), DOCUMENT, {})
+    (folder / "run.json").write_text(content)
+    with pytest.raises(DataError, match=r"run\.json: "):
+        read_stored(folder)

@@ -77,3 +77,9 @@ def test_force_sensors_need_a_gait_with_a_ground_reaction(tmp_path: Path) -> Non
 def test_what_is_no_number_of_minutes_is_refused(minutes: float) -> None:
     with pytest.raises(ArgumentError, match=rf"^minutes={minutes}: "):
         walk("solenoid", minutes=minutes)
+
+
+@pytest.mark.parametrize("minutes", [0.05, 61.0])
+def test_a_walk_too_short_or_too_long_is_refused(minutes: float) -> None:
+    with pytest.raises(ScenarioError, match=r"0\.087 min.* 60 min"):
+        walk("solenoid", minutes=minutes)

@@ -1,15 +1,18 @@
 """A walk on its bottle: what closes, an independent simulator, the coupling, what ends it, and what is refused."""
 
+from dataclasses import replace
+from inspect import unwrap
+
 import numpy as np
 import pytest
 
-from ppafo.errors import ParameterError, ScenarioError
+from ppafo.errors import ParameterError, ScenarioError, SimulationError
 from ppafo.parameters.overrides import over
 from ppafo.walking import load_walk, walk
 from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
-from ppafo.walking.walk import without_device
+from ppafo.walking.walk import compare_walks, without_device
 from tests.reference import bottle as independent
 
 WALK, BOTTLE = "solenoid-regulators", "paper-co2-9oz"
@@ -158,3 +161,14 @@ def test_many_wearers_and_an_energy_balance_have_no_bottle() -> None:
     with pytest.raises(ScenarioError, match=r"gas_model\.kind.*omit gas_model\.kind, or the bottle"):
         load_walk(WALK, [*changes, "gas_model.wall_area_per_volume=100 1/m"], bottle=BOTTLE)
     assert walk_of(without_device(configuration)).bottle is None
+
+
+def test_a_bottle_that_ends_a_walk_within_the_first_strides_is_named_with_its_time(
+    small: WalkResult, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert small.supply is not None
+    ending = small.supply.ending._replace(kind="empty", time=3.1, message="the bottle is empty")
+    ended = replace(small, supply=replace(small.supply, ended=ending))
+    monkeypatch.setitem(unwrap(compare_walks).__globals__, "walk", lambda *_, **__: ended)
+    with pytest.raises(SimulationError, match=r"ends after 3\.1 s, within the first 5 strides"):
+        compare_walks(small.scenario)

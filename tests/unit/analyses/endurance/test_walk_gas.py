@@ -1,6 +1,5 @@
 """The gas of a walk, from its folder as from its result, and how long a bottle lasts for it."""
 
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -73,11 +72,6 @@ def test_a_warm_bottle_ends_as_the_walk_does_and_gives_no_fewer_strides() -> Non
     assert found.recording["bottle_pressure"][-1] < regulator.set_pressure + regulator.pressure_margin
     assert found.strides <= found.strides_when_warm <= 1.05 * found.strides
     assert "regulator set to                 50 psi_g, the supply pressure of the device" in str(whole)
-
-
-def test_a_walk_without_gas_lasts_for_ever() -> None:
-    with pytest.raises(DataError, match="would become empty"):
-        ppafo.bottle(replace(solenoid(), metrics={}))
 
 
 def test_the_largest_flow_is_that_of_the_bottles_regulator_where_there_are_lines() -> None:

@@ -73,14 +73,6 @@ def test_a_study_is_run_printed_and_written(study: Path, tmp_path: Path, capsys:
     assert (out / "figure.svg").read_bytes() == drawn
 
 
-def test_json_has_the_summary(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert swept(study, tmp_path / "out", "--json", "--threads", "1", "--draws", "3") == 0
-    document = json.loads(capsys.readouterr().out)
-    assert document["completed"] == 3
-    assert document["configurations"]["base"]["rms_error"]["count"] == 3
-    assert document["folder"] == str(tmp_path / "out")
-
-
 def test_an_interruption_says_that_the_command_goes_on(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -84,6 +84,14 @@ def test_a_direction_that_is_turned_round_is_told_and_not_fitted() -> None:
         static_torque((planted.static(sign=-1.0),))
 
 
+def test_a_direction_that_is_none_is_named_with_its_sample() -> None:
+    source = planted.static()
+    values = source.recording["direction"].copy()
+    values[4] = 0.5
+    with pytest.raises(IdentificationError, match=r"'direction' is 0\.5 at sample 5"):
+        static_torque((changed(source, "direction", values),))
+
+
 def test_the_jitter_of_one_commanded_pressure_is_no_range_of_pressures() -> None:
     source = planted.static()
     pressure = source.recording["pressure_difference"]
