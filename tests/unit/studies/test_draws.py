@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from ppafo.errors import StudyError
+from ppafo.simulation.loading import load_scenario
 from ppafo.studies.draws import uncertainty_of
 from ppafo.studies.intervals import effective_sample_size, fraction_interval, replicates_interval
-from ppafo.studies.limits import MetricLimit
+from ppafo.studies.limits import MetricLimit, check_metrics
 from ppafo.studies.loading import drawn_in, load_study
 
 
@@ -115,3 +116,10 @@ def test_what_is_drawn_in_a_configuration_has_the_noise_and_can_leave_correlatio
     assert (study.name, base.name) == ("torque-task-uncertainty", "proportional")
     assert uncertainty.scores is not None
     assert drawn_in(study, (), "proportional", independent=True)[2].scores is None
+
+
+def test_metrics_are_checked_before_anything_runs() -> None:
+    closed, opened = load_scenario("torque-task-proportional"), load_scenario("step-response")
+    for names, scenario in ((["rms_eror"], closed), (["rms_error"], opened), (["peak_error", "peak_error"], closed)):
+        with pytest.raises(StudyError, match=r"did you mean|no reference|named twice"):
+            check_metrics(names, scenario)

@@ -1,6 +1,7 @@
 """Python objects as controllers where many runs are made: slow, one after the other, and with the same numbers."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -89,3 +90,9 @@ def test_a_command_that_is_no_number_names_the_object_and_a_valve_that_nothing_c
         run_ensemble(base.controlled_by(Proportional(float("nan"))), columns, METRIC)
     with pytest.raises(ScenarioError, match="has no controller; give one"):
         run_ensemble(replace(base, controller=Control(PYTHON_CONTROLLER, {}, base.controller.period)), columns, METRIC)
+
+
+@pytest.mark.parametrize("law", [Proportional, 1.0])
+def test_what_cannot_control_a_valve_is_refused(law: Any) -> None:
+    with pytest.raises(ScenarioError, match=r"no method 'reset'|is a class"):
+        ppafo.load_scenario(TASK).controlled_by(law)

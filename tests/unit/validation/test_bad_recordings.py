@@ -1,5 +1,6 @@
 """What cannot carry a comparison is refused in one line, or remarked on; never a silent wrong number."""
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ppafo.analyses.validate import validate
 from ppafo.errors import DataError, PpafoError
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
@@ -164,3 +166,19 @@ def test_channels_need_values_to_compare(step: Step) -> None:
     device, recording = step
     bare = Recording("bare", recording.time, {"command": Channel(recording["command"], "-")})
     assert "none of the channels to compare" in refused(bare, device)
+
+
+@pytest.mark.parametrize("text", ["pressure_3=0 psi_g", "angle=3 psi_g", "pressure_1=3 psi", "pressure_1"])
+def test_a_bad_initial_value_is_refused_and_a_gauge_one_counts_from_the_atmosphere(text: str) -> None:
+    assert parse_initial(["pressure_1=0 psi_g"], 9e4) == {"pressure_1": 9e4}
+    with pytest.raises(DataError, match="initial value"):
+        parse_initial([text], 101325.0)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"longest_delay": -1e-3}, {"longest_delay": 2.0}, {"motion": "mesured"}, {"volume": 0.0}, {"volume": math.nan}],
+)
+def test_settings_that_make_no_sense_are_refused_before_a_recording_is_read(settings: dict[str, Any]) -> None:
+    with pytest.raises(PpafoError, match=r"delay|did you mean 'measured'|volume"):
+        validate("ppafo2011", ["nowhere.csv"], **settings)
