@@ -183,6 +183,7 @@ def test_another_body_mass_than_the_files_is_taken_and_said(trial: Trial) -> Non
     found = import_gait([trial()], ImportSettings(70.0))
     assert found.gait.body_mass == 70.0
     assert "body mass 70 kg as given; trial.c3d states 62 kg" in found.remarks
+    assert not any("as given" in remark for remark in import_gait([trial()], ImportSettings(62.0)).remarks)
 
 
 def test_a_walk_across_the_axes_is_refused(trial: Trial) -> None:
