@@ -31,3 +31,18 @@ def test_the_remedy_of_a_walk_that_does_not_lift_the_toes_lifts_them(name: str, 
     ((toes, work),) = re.findall(gain, said)
     assert f"toes {toes} mm over the ground" in again
     assert f": {work} J of net work" in again
+
+
+@pytest.mark.parametrize(
+    ("overrides", "asked", "setting"),
+    [
+        (("controller.hold_stiffness=0 N m/rad",), r"1\.\d+", r"hold_stiffness = [\d.]+ N m/rad"),
+        (("controller.largest_torque=1.5 N m",), r"1\.5", r"largest_torque = 5 N m"),
+    ],
+)
+def test_toes_that_drag_below_the_reach_of_the_actuator_are_mended_at_the_controller(
+    overrides: tuple[str, ...], asked: str, setting: str
+) -> None:
+    said = sentence("proportional", *overrides)
+    cause = f"the controller requests {asked} N m at the lowest toes, where the actuator gives 5 N m"
+    assert re.search(rf"{cause}: for example with `controller\.{setting}`, toes", said), said
