@@ -24,6 +24,9 @@ _CURRENT_FOLDER, _EXCHANGE = -100, 2
 MAXIMUM_BYTES_RECORDED = 2_000_000_000
 """Largest size of a recording file [bytes]; an hour at 1 kHz with twenty channels is smaller, even as text."""
 
+MAXIMUM_GROWTH = 100
+"""Largest ratio of memory for reading a file to its size [-], beyond what a file of any size may take."""
+
 
 def read_bytes(path: str | Path, maximum: int = MAXIMUM_BYTES_RECORDED) -> bytes:
     """Return the content of a regular file. Raises DataError if absent, empty or larger than ``maximum`` bytes."""
@@ -34,6 +37,18 @@ def read_bytes(path: str | Path, maximum: int = MAXIMUM_BYTES_RECORDED) -> bytes
     if not content:
         raise DataError(f"{path}: is empty")
     return content
+
+
+def check_growth(required: int, size: int, always_allowed: int) -> None:
+    """Raise DataError for a file that takes implausibly much memory to read; all sizes in bytes.
+
+    ``always_allowed`` is the memory that a file of any size may take.
+    """
+    if required > max(always_allowed, MAXIMUM_GROWTH * size):
+        raise DataError(
+            f"requires {required / 1e6:,.0f} MB of memory, more than {MAXIMUM_GROWTH} times the size of the file "
+            f"({size / 1e6:.2g} MB)"
+        )
 
 
 def text_of(content: bytes, encoding: str = "utf-8", remedy: str = "") -> str:

@@ -21,7 +21,7 @@ from ppafo.errors import ArgumentError, DataError
 from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.signals import CHANNELS, Channel, Recording, recording_kind
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT
-from ppafo.storage.files import read_bytes
+from ppafo.storage.files import check_growth, read_bytes
 from ppafo.units import conversion
 from ppafo.wording import one_line
 
@@ -45,8 +45,6 @@ _BYTES_OF_A_FLOAT = 8
 """Bytes per number in a recording, independent of the type in the file."""
 _ALWAYS_ALLOWED = 32_000_000
 """Memory that reading may take for a file of any size [bytes]."""
-_MAXIMUM_GROWTH = 100
-"""Largest ratio of memory for reading to file size [-], for larger files."""
 _CHECKSUM_BYTES = 64
 """Largest excess of a chunk over its numbers [bytes]; a Fletcher checksum takes four."""
 
@@ -88,11 +86,7 @@ def read_netcdf(path: str | Path) -> Recording:
             # Before memory is allocated: numbers must not need far more than the size of the file.
             chunks = [math.prod(item.chunks) * item.dtype.itemsize for item in variables.values() if item.chunks]
             required = sum(chunks) + sum(_BYTES_OF_A_FLOAT * item.size for item in variables.values())
-            if required > max(_ALWAYS_ALLOWED, _MAXIMUM_GROWTH * len(content)):
-                raise DataError(
-                    f"requires {required / 1e6:,.0f} MB of memory, more than {_MAXIMUM_GROWTH} times the size of the "
-                    f"file ({len(content) / 1e6:.2g} MB)"
-                )
+            check_growth(required, len(content), _ALWAYS_ALLOWED)
             for name, variable in variables.items():
                 _check_is_whole(name, variable)
             time = _channel(TIME, variables.pop(TIME))

@@ -1,21 +1,25 @@
 """Tables as Parquet files: unit and description of each column, reproducible bytes, detection of damage."""
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.errors import DataError
+from ppafo.errors import DataError, refused_as
+from ppafo.storage.files import check_growth
 from ppafo.wording import one_line
 
 if TYPE_CHECKING:
     import pyarrow as pa
+    import pyarrow.parquet as pq
 
 _COMPRESSION_LEVEL = 1
 """Compression level of zstd, its fastest."""
-_MAXIMUM_VALUES = 200_000_000
-"""Largest number of values read from a table; a chunk of channels over time has some millions."""
+_BYTES_OF_A_VALUE = 8
+"""Bytes per number in memory, independent of the type and the encoding in the file."""
+_ALWAYS_ALLOWED = 100_000_000
+"""Memory that reading may take for a file of any size [bytes]; a block of a study has less than this in constants."""
 _FLOATING_TYPES = ("double", "float")
 """Arrow names of floating-point types."""
 _LONGEST_SHOWN = 120
@@ -66,27 +70,52 @@ def _array(values: Any) -> "pa.Array":
     return pa.array(values, type=pa.string() if values.dtype == object else None)
 
 
-def read_parquet(file: io.BufferedIOBase, name: str, columns: Sequence[str] | None = None) -> "pa.Table":
+def read_parquet(
+    file: io.BufferedIOBase,
+    name: str,
+    columns: Sequence[str] | None = None,
+    check_schema: "Callable[[pa.Schema], object] | None" = None,
+) -> "pa.Table":
     """Read a table, or some of its columns, and close the file; ``name`` is the file name in messages.
 
-    Raises DataError for a damaged file (checksums included), for far too many values, and for a missing column.
+    ``check_schema`` may refuse the schema before any value is read. Texts stay encoded, each kept once. Raises
+    DataError for a damaged file (checksums included), a file that expands to far more than its size, and a missing
+    column.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
         with file, pq.ParquetFile(file, page_checksum_verification=True) as parquet:
-            # Counted before memory is taken: a column of one constant takes no room in the file.
-            groups = (parquet.metadata.row_group(number) for number in range(parquet.metadata.num_row_groups))
-            count = sum(group.column(column).num_values for group in groups for column in range(group.num_columns))
-            if count > _MAXIMUM_VALUES:
-                raise DataError(f"{name}: has {count:,} values; a table of a study has at most {_MAXIMUM_VALUES:,}")
-            missing = [column for column in columns or () if column not in parquet.schema_arrow.names]
+            schema = parquet.schema_arrow
+            missing = [column for column in columns or () if column not in schema.names]
             if missing:
                 raise DataError(f"{name}: has no column '{one_line(missing[0])}'")
-            return parquet.read(columns=None if columns is None else list(columns))
+            with refused_as(DataError, name, DataError):
+                if check_schema is not None:
+                    check_schema(schema)
+                # Before memory is allocated: a column of one constant takes no space in the file.
+                check_growth(_expanded_bytes(parquet.metadata), file.seek(0, io.SEEK_END), _ALWAYS_ALLOWED)
+            # Each text is kept once: a long one may stand in every row.
+            texts = [column.path for column in parquet.schema if column.physical_type == "BYTE_ARRAY"]
+            encoded = pq.ParquetFile(
+                file, metadata=parquet.metadata, read_dictionary=texts, page_checksum_verification=True
+            )
+            return encoded.read(columns=None if columns is None else list(columns))
     except (pa.ArrowException, OSError, ValueError) as error:
         raise DataError(f"{name}: is not a complete Parquet file: {one_line(error)[:_LONGEST_SHOWN]}") from error
+
+
+def _expanded_bytes(metadata: "pq.FileMetaData") -> int:
+    """Memory of all values of a file [bytes], by the counts that its metadata state."""
+    required = 0
+    for number in range(metadata.num_row_groups):
+        group = metadata.row_group(number)
+        for index in range(group.num_columns):
+            column, width = group.column(index), metadata.schema.column(index).length or 0
+            count = max(column.num_values, group.num_rows)
+            required += max(count * max(width, _BYTES_OF_A_VALUE), column.total_uncompressed_size)
+    return required
 
 
 def matrix_of(column: "pa.ChunkedArray") -> "np.ndarray[Any, Any]":
@@ -96,8 +125,19 @@ def matrix_of(column: "pa.ChunkedArray") -> "np.ndarray[Any, Any]":
 
 
 def as_numpy(table: "pa.Table") -> dict[str, "np.ndarray[Any, Any]"]:
-    """Return the columns as NumPy arrays; texts become object arrays."""
-    return {name: table.column(name).to_numpy() for name in table.column_names}
+    """Return the columns as NumPy arrays; texts become object arrays, an empty cell None."""
+    import pyarrow as pa
+
+    return {
+        field.name: _texts(column) if pa.types.is_dictionary(field.type) else column.to_numpy()
+        for field, column in zip(table.schema, table.columns, strict=True)
+    }
+
+
+def _texts(column: "pa.ChunkedArray") -> "np.ndarray[Any, Any]":
+    encoded = column.combine_chunks()
+    texts = np.array([*encoded.dictionary.to_pylist(), None], dtype=object)
+    return np.take(texts, encoded.indices.fill_null(-1))
 
 
 def encode_texts(codes: "np.ndarray[Any, Any]", texts: Sequence[str]) -> "pa.DictionaryArray":

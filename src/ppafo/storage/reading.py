@@ -1,23 +1,26 @@
 """Reading of recordings from files of all supported formats, result folders and data frames."""
 
-from collections.abc import Mapping, Sequence
+import io
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.arguments import Pressure, Word, checked
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, refused_as
 from ppafo.signals import Recording, recording_kind
-from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT
-from ppafo.storage.comma_separated import parse_header, read_csv, recording_of_columns
+from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT, Floats
+from ppafo.storage.comma_separated import HeaderColumn, parse_header, read_csv, recording_of_columns
 from ppafo.storage.netcdf import read_netcdf
 from ppafo.storage.result_folder import CSV_FILE, MANIFEST, NETCDF_FILE, RUN_FILE, read_document, read_stored
 from ppafo.wording import one_line
 
 if TYPE_CHECKING:
+    import pyarrow as pa
     from pandas import DataFrame  # type: ignore[import-untyped]
     from xarray import Dataset
 
@@ -36,27 +39,11 @@ def recording_of_frame(frame: Any, atmosphere: float = STANDARD_ATMOSPHERE) -> R
     Time is a column, the index, or the coordinate of a Dataset; gauge pressures are relative to ``atmosphere`` [Pa
     absolute]. Raises DataError for a table without time, a column without unit and a cell that is no finite number.
     """
-    attributes = dict(frame.attrs)
-    if hasattr(frame, "data_vars"):
-        names = [TIME, *(str(name) for name in frame.data_vars)]
-        if TIME not in frame.coords and TIME not in frame.data_vars:
-            known = ", ".join(map(str, frame.coords))
-            raise DataError(f"the Dataset has no coordinate '{TIME}'; its coordinates are {known}")
-        names = list(dict.fromkeys(names))
-        values = [np.asarray(frame[name].values) for name in names]
-        units = {name: str(frame[name].attrs.get("units", "")) for name in names}
-    else:
-        names = [str(name) for name in frame.columns]
-        values = [np.asarray(frame[name].to_numpy()) for name in frame.columns]
-        units = {str(name): str(unit) for name, unit in dict(attributes.get("units", {})).items()}
-        if not any(_is_time(name) for name in names):
-            named = str(frame.index.name or "")
-            if not _is_time(named):
-                known = ", ".join(map(one_line, names))
-                raise DataError(f"the table has no column and no index '{TIME} [{TIME_UNIT}]'; available: {known}")
-            names, values = [named, *names], [np.asarray(frame.index), *values]
+    attributes, named = dict(frame.attrs), _columns_of(frame)
+    columns = _header_of(frame, named)
     title, kind = str(attributes.get("title", "")) or "table", str(attributes.get("kind", "measured"))
-    return _recording(names, values, units, title, kind, atmosphere)
+    values = [_numbers(name, np.asarray(column)) for name, column in named]
+    return recording_of_columns(columns, values, range(len(values[0])), title, recording_kind(kind), atmosphere, "row")
 
 
 def read_parquet(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
@@ -64,54 +51,77 @@ def read_parquet(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> R
 
     Raises DataError, naming the file, if it cannot be used.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
+    from pyarrow import ArrowException
 
+    from ppafo.storage import parquet
     from ppafo.storage.files import read_bytes
 
-    content = read_bytes(path)
-    with refused_as(DataError, str(path), DataError):
-        try:
-            table = pq.read_table(pa.BufferReader(content))
-            frame = table.to_pandas()
-        except (pa.ArrowException, OSError, ValueError) as error:
-            raise DataError(f"is not a readable Parquet file: {one_line(error)}") from error
+    def framed(table: "pa.Table") -> Any:
+        frame = table.to_pandas()
         units = {
             field.name: (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace") for field in table.schema
         }
         frame.attrs |= {"units": units | frame.attrs.get("units", {}), "title": one_line(Path(path).stem)}
-        return recording_of_frame(frame, atmosphere)
+        return frame
+
+    def check_names(schema: "pa.Schema") -> None:
+        frame = framed(schema.empty_table())
+        _header_of(frame, _columns_of(frame))
+
+    table = parquet.read_parquet(io.BytesIO(read_bytes(path)), str(path), check_schema=check_names)
+    with refused_as(DataError, str(path), DataError, ArrowException):
+        return recording_of_frame(framed(table), atmosphere)
 
 
 def _is_time(name: str) -> bool:
     return name.partition("[")[0].strip() == TIME
 
 
-def _recording(
-    names: Sequence[str], values: Sequence[Any], units: Mapping[str, str], label: str, kind: str, atmosphere: float
-) -> Recording:
-    """Return a recording from columns in any order, with units in their names or in ``units``."""
-    pairs = sorted(zip(names, values, strict=True), key=lambda pair: not _is_time(pair[0]))
-    heads, columns = [], []
-    for name, column in pairs:
+def _columns_of(frame: Any) -> list[tuple[str, Any]]:
+    """Return name and column of a DataFrame or a Dataset, time first. Raises DataError for a table without time."""
+    if hasattr(frame, "data_vars"):
+        if TIME not in frame.coords and TIME not in frame.data_vars:
+            known = ", ".join(map(str, frame.coords))
+            raise DataError(f"the Dataset has no coordinate '{TIME}'; its coordinates are {known}")
+        names = dict.fromkeys([TIME, *map(str, frame.data_vars)])
+        return [(name, frame[name]) for name in names]
+    columns = [(str(name), column) for name, column in frame.items()]
+    if not any(_is_time(name) for name, _ in columns):
+        columns = [(str(frame.index.name or ""), frame.index), *columns]
+    if not any(_is_time(name) for name, _ in columns):
+        known = ", ".join(one_line(name) for name, _ in columns[1:])
+        raise DataError(f"the table has no column and no index '{TIME} [{TIME_UNIT}]'; available: {known}")
+    return sorted(columns, key=lambda column: not _is_time(column[0]))
+
+
+def _header_of(frame: Any, columns: Sequence[tuple[str, Any]]) -> list[HeaderColumn]:
+    """Return the header of columns with units in their names, in their attributes or in those of the frame."""
+    if hasattr(frame, "data_vars"):
+        units = {name: str(column.attrs.get("units", "")) for name, column in columns}
+    else:
+        units = {str(name): str(unit) for name, unit in dict(frame.attrs.get("units", {})).items()}
+    heads = []
+    for name, _ in columns:
         unit, head = units.get(name, ""), name
         # Of a table without units all names are bare, its time too.
         if "[" not in name and (unit or (name == TIME and any(units.values()))):
             head = f"{name} [{PLAIN_NUMBER if unit == '1' else unit or TIME_UNIT}]"
         heads.append(head)
-        if np.issubdtype(column.dtype, np.timedelta64):
-            columns.append(column / np.timedelta64(1, "s"))
-            continue
-        try:
-            numbers = column.astype(np.float64)
-        except (TypeError, ValueError) as error:
-            raise DataError(f"column '{one_line(name)}' is not numeric") from error
-        wrong = np.flatnonzero(~np.isfinite(numbers))
-        if wrong.size:
-            raise DataError(f"column '{one_line(name)}': row {wrong[0]} is {numbers[wrong[0]]}, not a finite number")
-        columns.append(numbers)
-    rows = range(len(columns[0]))
-    return recording_of_columns(parse_header(heads), columns, rows, label, recording_kind(kind), atmosphere, "row")
+    return parse_header(heads)
+
+
+def _numbers(name: str, column: NDArray[Any]) -> Floats:
+    """Return a column as numbers, a duration in s. Raises DataError for a cell that is no finite number."""
+    if np.issubdtype(column.dtype, np.timedelta64):
+        column = column / np.timedelta64(1, "s")
+    try:
+        numbers = column.astype(np.float64)
+    except (TypeError, ValueError) as error:
+        raise DataError(f"column '{one_line(name)}' is not numeric") from error
+    wrong = np.flatnonzero(~np.isfinite(numbers))
+    if wrong.size:
+        raise DataError(f"column '{one_line(name)}': row {wrong[0]} is {numbers[wrong[0]]}, not a finite number")
+    return numbers
 
 
 @checked

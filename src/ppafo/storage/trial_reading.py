@@ -13,6 +13,7 @@ from importlib import import_module
 from pathlib import Path
 
 from ppafo.errors import DataError
+from ppafo.storage.files import MAXIMUM_GROWTH
 
 TRIAL = ("-P", "-m", __name__)
 """Python arguments for the separate process; ``-P`` prevents imports from the working folder."""
@@ -24,8 +25,6 @@ REFUSED, OUT_OF_MEMORY = 76, 77
 """Exit codes: invalid file, with one line of explanation on the output; and excessive memory."""
 _ALWAYS_ALLOWED = 400_000_000
 """Memory that reading may take for a file of any size [bytes]."""
-_MAXIMUM_GROWTH = 100
-"""Largest ratio of memory for reading to file size [-], for larger files."""
 
 
 def check_can_be_read(path: Path, read: Callable[[str], object], library: str) -> None:
@@ -72,7 +71,7 @@ def read_on_trial(reader: str, library: str, path: str) -> int:
         import resource
 
         taken = int(sizes.read_text().split()[0]) * resource.getpagesize()
-        limit = taken + max(_ALWAYS_ALLOWED, _MAXIMUM_GROWTH * Path(path).stat().st_size)
+        limit = taken + max(_ALWAYS_ALLOWED, MAXIMUM_GROWTH * Path(path).stat().st_size)
         highest = resource.getrlimit(resource.RLIMIT_AS)[1]
         limit = limit if highest == resource.RLIM_INFINITY else min(limit, highest)
         resource.setrlimit(resource.RLIMIT_AS, (limit, highest))
