@@ -79,12 +79,12 @@ def at_fault(argument: str) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def refused_as(kind: Callable[[str], PpafoError], place: object, *caught: type[Exception]) -> Iterator[None]:
-    """Convert exceptions of a ``with`` block to another error, prefixed by ``place`` (file, key or option)."""
+def refused_as(kind: Callable[[str], PpafoError], place: object, *caught: type[BaseException]) -> Iterator[None]:
+    """Convert exceptions of a ``with`` block to another error, one line after ``place`` (file, key or option)."""
     try:
         yield
     except caught as error:
-        raise kind(f"{place}: {error}") from error
+        raise kind(f"{place}: {' '.join(str(error).split())}") from error
 
 
 @contextlib.contextmanager

@@ -22,7 +22,7 @@ _OF_GAS = {"kg": "gas mass", "kg/J": "gas mass per energy"}
 """Quantity of a metric by SI unit, where the unit alone is ambiguous: masses among the metrics are gas masses."""
 _ON_AXES = {"psi_g": "psig", "psi_a": "psia", "mm^2": "mm$^2$", "cm^3": "cm$^3$", "degC": "°C"}
 """Forms of display units on the axes of figures, where these differ from the form in tables."""
-_PRESSURE_KINDS = {"_g": " gauge", "_a": " absolute"}
+_PRESSURE_KINDS = {"_g": " gauge", "_a": " absolute", "_d": ""}
 """Words for the suffixes of pressure units on the axes of figures."""
 _PREFIXES = {"sensors": "Sensors: ", "supply_line": "Line: "}
 REFERENCE_LEVELS = {"reference.level": "to hold", "reference.start_level": "before the ramp"}
@@ -79,15 +79,15 @@ class Kind:
     def shown_unit(self) -> str:
         """Display unit; empty for a dimensionless number."""
         if self.given or self.quantity:
-            return (self.given or unit_of(self.quantity)).removesuffix("_d")
+            return self.given or unit_of(self.quantity)
         return self.unit.removeprefix("-")
 
     @property
     def shown_change_unit(self) -> str:
         """Display unit of a difference of two values."""
         unit = self.given if self.given and self.quantity else self.shown_unit
-        # A difference of pressures is neither gauge nor absolute.
-        return unit[:-2] if self.quantity == "pressure" and unit.endswith(("_g", "_a")) else unit
+        # No text to paste: a difference of pressures is neither gauge nor absolute.
+        return unit[:-2] if unit.endswith(("_g", "_a", "_d")) else unit
 
     @property
     def title(self) -> str:
@@ -106,8 +106,8 @@ class Kind:
         unit = self.shown_unit
         if not self.quantity or unit in _ON_AXES:
             return _ON_AXES[unit] if self.quantity else "" if unit == "1" else unit
-        if self.quantity == "pressure":
-            unit = f"{unit[:-2]}{_PRESSURE_KINDS.get(unit[-2:], unit[-2:])}"
+        if unit[-2:] in _PRESSURE_KINDS:
+            unit = f"{unit[:-2]}{_PRESSURE_KINDS[unit[-2:]]}"
         return "" if unit == "1" else unit.replace("m^2", "m$^2$").replace("m^3", "m$^3$").replace("s^2", "s$^2$")
 
     def shown(self, value: float) -> float:

@@ -137,7 +137,8 @@ def as_numpy(table: "pa.Table") -> dict[str, "np.ndarray[Any, Any]"]:
 def _texts(column: "pa.ChunkedArray") -> "np.ndarray[Any, Any]":
     encoded = column.combine_chunks()
     texts = np.array([*encoded.dictionary.to_pylist(), None], dtype=object)
-    return np.take(texts, encoded.indices.fill_null(-1))
+    rows: np.ndarray[Any, Any] = texts[encoded.indices.fill_null(-1).to_numpy()]
+    return rows
 
 
 def encode_texts(codes: "np.ndarray[Any, Any]", texts: Sequence[str]) -> "pa.DictionaryArray":

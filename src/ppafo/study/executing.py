@@ -17,14 +17,17 @@ from queue import SimpleQueue
 from secrets import token_hex
 from typing import Any, TypeVar
 
-from ppafo.errors import PpafoError, StudyError, refused_as
+from ppafo.errors import PpafoError, StudyError, noted_in, raise_noted, refused_as
 from ppafo.plugins import name_modules_in, object_of
 from ppafo.version import __version__
+from ppafo.wording import one_line
 
 _TRIALS = 3
 """Number of workers that may be lost with a block before it is given up."""
 _IN_FLIGHT = 4096
 """Largest number of blocks that are submitted and not yet written: four for each of a thousand workers."""
+_BETWEEN_LOOKS = 1.0
+"""Time between two looks of a worker for its caller [s]."""
 Block = TypeVar("Block")
 Answer = TypeVar("Answer")
 
@@ -34,8 +37,9 @@ def executor_of(given: Executor | str | None) -> Executor | None:
     found: Any = given
     if isinstance(given, str) and ":" in given:
         name_modules_in(given)
+        place = f"executor = '{given}'"
         # A function of the user may raise anything.
-        with refused_as(StudyError, f"executor = '{given}'", Exception):
+        with refused_as(StudyError, f"{place}: calls sys.exit", SystemExit), refused_as(StudyError, place, Exception):
             found = object_of(given)
             found = found() if callable(found) and not isinstance(found, Executor) else found
     executor: Executor | None = found
@@ -52,34 +56,42 @@ def computed_by(
 ) -> Iterator[tuple[int, Answer]]:
     """Yield number and answer of each block, in the order in which workers end; a lost block is submitted again.
 
-    Raises StudyError for a module that a worker lacks, for an executor without workers, and for a block lost again and
-    again.
+    Raises StudyError for a module that a worker lacks, for an executor without workers, for a block lost again and
+    again, and for an answer to another submission. Before an executor that takes no more work is refused, the blocks
+    that it has finished are yielded.
     """
-    ended, lost = SimpleQueue[Future[Answer]](), Counter[int]()
+    ended, lost, waiting = SimpleQueue[Future[Any]](), Counter[int](), dict[Future[Any], tuple[int, str]]()
+    faults = list[PpafoError]()
     said = "executor: a class or function of the study cannot be sent to workers"
     with refused_as(StudyError, said, pickle.PicklingError, AttributeError, TypeError):
         sent = pickle.dumps(work)
-    waiting: dict[Future[Answer], int] = {}
     numbers = iter(range(len(blocks)))
 
     def submit(number: int) -> None:
-        try:
-            # With a mark of its own, as Dask takes equal calls for one, which may be the one that failed.
-            future = executor.submit(_computed, sent, blocks[number], __version__, token_hex())
-        except RuntimeError as error:  # it was shut down, or a process of it was killed
-            raise StudyError(f"executor: takes no more work ({error}); give a new one") from error
-        waiting[future] = number
-        future.add_done_callback(ended.put)
+        if faults:
+            return
+        # The mark tells submissions apart: Dask takes equal calls for one, which may be the one that failed.
+        mark = token_hex()
+        # An executor of the user may raise anything.
+        with noted_in(faults), refused_as(StudyError, "executor: takes no more work, give a new one", Exception):
+            future = executor.submit(_computed, sent, blocks[number], __version__, mark)
+            future.add_done_callback(ended.put)
+            waiting[future] = number, mark
 
     try:
         for number in islice(numbers, _IN_FLIGHT):
             submit(number)
-        while waiting:
+        while waiting and not (faults and ended.empty()):
             future = ended.get()
-            number = waiting.pop(future)
+            number, mark = waiting.pop(future)
             error = CancelledError("cancelled") if future.cancelled() else future.exception()
             if error is None:
-                yield number, future.result()
+                match future.result():
+                    case (str(answered), answer) if answered == mark:
+                        yield number, answer
+                    case foreign:
+                        kind = type(foreign).__name__
+                        raise StudyError(f"executor: answers block {number} with a {kind} that is not its result")
                 for following in islice(numbers, 1):
                     submit(following)
             elif isinstance(error, PpafoError):
@@ -87,16 +99,17 @@ def computed_by(
             else:
                 lost[number] += 1
                 if lost[number] == _TRIALS:
-                    said = f"executor: block {number} was lost {_TRIALS} times: {type(error).__name__}: {error}"
-                    raise StudyError(said) from error
+                    said = f"executor: block {number} was lost {_TRIALS} times: {type(error).__name__}"
+                    raise StudyError(f"{said}: {one_line(error)}") from error
                 submit(number)
+        raise_noted(faults[:1])
     finally:
         for future in waiting:
             future.cancel()
 
 
-def _computed(sent: bytes, block: Any, version: str, _mark: str) -> Any:
-    """Return the answer to a block, on a worker."""
+def _computed(sent: bytes, block: Any, version: str, mark: str) -> tuple[str, Any]:
+    """Return the mark of a submission with the answer to its block, on a worker."""
     _end_with_caller()
     if version != __version__:
         raise StudyError(f"executor: a worker has ppafo {__version__}, not {version}; install the same version there")
@@ -108,16 +121,19 @@ def _computed(sent: bytes, block: Any, version: str, _mark: str) -> Any:
             f"executor: a worker cannot load the study: {error}; install this module there, or send it by means of the "
             "executor, such as upload_file of Dask's Client"
         ) from error
-    return work(block)
+    return mark, work(block)
 
 
 @cache
 def _end_with_caller() -> None:
     """Make the process of a worker that computes end with the one that started it: a pool's outlive a killed caller."""
     if (parent := multiprocessing.parent_process()) is not None:
+        caller = os.getppid()
 
         def end() -> None:
-            parent.join()
+            # Forked workers keep each other's pipes to the caller open: its number tells too that it has ended.
+            while parent.is_alive() and os.getppid() == caller:
+                parent.join(_BETWEEN_LOOKS)
             os._exit(1)
 
         threading.Thread(target=end, daemon=True).start()

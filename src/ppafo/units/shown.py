@@ -168,9 +168,7 @@ def shown_text(value: float, si_unit: str, form: str = ".6g", atmosphere: float 
     """
     quantity, unit = quantity_of_unit(si_unit), unit or shown_unit(si_unit)
     zero = QUANTITIES[quantity].zero if quantity else 0.0
-    number = without_exponent(shown_value(value, si_unit, unit, atmosphere, zero), form)
-    # A difference of pressures is neither gauge nor absolute.
-    return f"{number} {unit.removesuffix('_d')}".rstrip()
+    return f"{without_exponent(shown_value(value, si_unit, unit, atmosphere, zero), form)} {unit}".rstrip()
 
 
 def written_text(value: float, si_unit: str) -> str:

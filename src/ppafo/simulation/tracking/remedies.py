@@ -107,8 +107,7 @@ def level_text(unit: str, number: float) -> str:
     value, shown = metric_level(float(number), unit)
     if shown == "s" and abs(value) < _SHORT:
         value, shown = 1.0e3 * value, "ms"
-    # As it can be pasted: a difference of pressures is told from a level by its unit.
-    return f"{without_exponent(value, '.3g')} {shown}{'_d' if unit == 'Pa_d' else ''}".rstrip()
+    return f"{without_exponent(value, '.3g')} {shown}".rstrip()
 
 
 def change_text(controlled: str, number: float, digits: int = 3) -> str:

@@ -1,11 +1,13 @@
 """Studies on the workers of an executor: the same bytes as on one computer, whatever is lost on the way."""
 
+import contextlib
 import copy
 import os
 import pickle
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
@@ -74,24 +76,100 @@ def test_a_worker_of_another_version_and_a_study_that_cannot_be_sent_are_refused
         list(computed_by(ThreadPoolExecutor(1), lambda block: block, [1]))
 
 
+class Answering(ThreadPoolExecutor):
+    """An executor that answers in a way of its own, after ``good`` answers as they should be."""
+
+    def __init__(self, answer: Any, good: int = 1) -> None:
+        super().__init__(1)
+        self.answer, self.good = answer, good
+        self.first: Future[Any] | None = None
+
+    def submit(self, function: Any, /, *values: Any, **named: Any) -> Any:
+        self.good -= 1
+        if self.good >= 0:
+            self.first = super().submit(function, *values, **named)
+            self.first.result()
+            return self.first
+        return self.answer(self)
+
+
+def fails(error: Exception) -> Any:
+    """Raises an error, as a function."""
+    raise error
+
+
+def ended(result: Any) -> "Future[Any]":
+    """A future that has a result."""
+    future: Future[Any] = Future()
+    future.set_result(result)
+    return future
+
+
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        (
+            lambda _: fails(OSError("connection lost\nline 2")),
+            "takes no more work, give a new one: connection lost line",
+        ),
+        (lambda _: fails(TypeError("cannot pickle 'x'")), "takes no more work, give a new one: cannot pickle 'x'"),
+        (lambda _: None, "takes no more work, give a new one: 'NoneType' object has no attribute"),
+        (lambda _: ended("garbage"), "answers block 1 with a str that is not its result"),
+        (lambda own: ended(own.first.result()), "answers block 1 with a tuple that is not its result"),
+    ],
+)
+def test_an_executor_that_fails_is_refused_in_one_line_after_its_finished_blocks(answer: Any, message: str) -> None:
+    answers = computed_by(Answering(answer), abs, [-4, -5])
+    assert next(answers) == (0, 4)
+    with pytest.raises(StudyError, match=message) as refused:
+        next(answers)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_function_that_ends_the_process_is_no_executor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "ends_process.py").write_text("import sys\ndef make():\n    sys.exit(3)\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(StudyError, match=r"executor = 'ends_process:make': calls sys\.exit: 3"):
+        ppafo.tune("pid-gains", executor="ends_process:make", plugins=["ends_process.py"])
+
+
 CALLER = """
 from concurrent.futures import ProcessPoolExecutor
-import os, pickle, ppafo, time
+from multiprocessing import get_context
+import pickle, ppafo, time
 from ppafo.study.executing import _computed
 if __name__ == "__main__":
-    pool = ProcessPoolExecutor(1)  # of two, one may take both blocks, and the other, which computed nothing, stays
-    print(pool.submit(_computed, pickle.dumps(divmod), 0, ppafo.__version__, "").exception() and 0, flush=True)
+    pool = ProcessPoolExecutor(4, get_context("fork"))
+    block = pickle.dumps(eval), "__import__('os').getpid()"
+    mark, worker = pool.submit(_computed, *block, ppafo.__version__, "").result()
+    print(worker, *pool._processes, flush=True)
     time.sleep(60)
 """
 
 
-def test_the_worker_of_a_pool_ends_with_a_caller_that_is_killed(tmp_path: Path) -> None:
+def is_running(number: int) -> bool:
+    """Whether a process is there and has not ended."""
+    with contextlib.suppress(OSError):
+        return Path(f"/proc/{number}/stat").read_text(encoding="utf-8").split()[2] != "Z"
+    return False
+
+
+def test_a_worker_that_computed_ends_with_a_caller_that_is_killed(tmp_path: Path) -> None:
     (tmp_path / "caller.py").write_text(CALLER)
     with subprocess.Popen([sys.executable, tmp_path / "caller.py"], stdout=subprocess.PIPE, text=True) as caller:
         assert caller.stdout is not None
-        assert caller.stdout.readline() == "0\n"
+        worker, *pool = map(int, caller.stdout.readline().split())
         caller.kill()
-        caller.communicate(timeout=20)  # the output ends with the last process that has it: the worker
+        limit = time.monotonic() + 20.0
+        try:
+            while is_running(worker):
+                assert time.monotonic() < limit
+                time.sleep(0.1)
+        finally:
+            # Those that computed nothing know of no caller.
+            for number in pool:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(number, signal.SIGKILL)
 
 
 @pytest.fixture(scope="module")
