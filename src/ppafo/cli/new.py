@@ -149,7 +149,7 @@ def new(
     write_file(path, _content(kind, source, name, path).encode())
     # A copy that does not load, such as one with a path relative to another folder, is not left.
     try:
-        load(path)
+        loaded = load(path)
     except BaseException:
         path.unlink(missing_ok=True)
         raise
@@ -157,7 +157,13 @@ def new(
     document = {"kind": kind, "name": name, "file": str(path), "next": command}
     kept = "values, sources and citation" if kind == "set" else "values, notes and sources"
     copied = f", still with {kept} of {source}" if source and kind in _WITH_SOURCES else ""
-    return CommandOutput(f"written: {path}{copied}; next: {command}", document)
+    text = f"written: {path}{copied}; next: {command}"
+    if kind == "set":
+        from ppafo.parameters.audit.evidence import Evidence
+        from ppafo.parameters.audit.proportions import unusual
+
+        text = "\n".join((text, *(f"warning: {finding.title}" for finding in unusual(Evidence(loaded)))))
+    return CommandOutput(text, document)
 
 
 def list_kinds() -> list[dict[str, str]]:

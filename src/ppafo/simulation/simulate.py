@@ -115,14 +115,16 @@ class Result(RecordedResult):
 
     @in_own_units
     def sentences(self, verdict: "Tracking") -> list[str]:
-        """Sentences of ``run.json``: tracking, remarks, and changed values.
+        """Sentences of ``run.json``: unusual proportions of the device, tracking, remarks, and changed values.
 
         ``verdict`` is ``tracking``, with or without remedies that were tried.
         """
+        from ppafo.parameters.audit.proportions import unusual_text
         from ppafo.simulation.tracking.verdict import remarks_on
 
         remarks = remarks_on(self, not verdict.fails and bool(verdict.said))
-        said = (verdict.sentence, *remarks, changed_text(changes_in(self.scenario)))
+        device = unusual_text(self.scenario.device)
+        said = (device, verdict.sentence, *remarks, changed_text(changes_in(self.scenario)))
         return list(filter(None, said))
 
     @in_own_units

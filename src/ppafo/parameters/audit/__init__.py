@@ -9,7 +9,7 @@ import contextlib
 from dataclasses import replace
 
 from ppafo.errors import ParameterError
-from ppafo.parameters.audit import actuator, orifices, values
+from ppafo.parameters.audit import actuator, orifices, proportions, values
 from ppafo.parameters.audit.changes import changes
 from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence, NamedValue, Question, Severity
 from ppafo.parameters.loading import set_or_load
@@ -41,6 +41,7 @@ QUESTIONS: tuple[Question, ...] = (
     actuator.torque_ceiling,
     actuator.published_torque,
     values.ideal_gas,
+    proportions.unusual,
 )
 _ORDER = {"error": 0, "warning": 1, "note": 2}
 
