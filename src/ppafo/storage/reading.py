@@ -1,7 +1,6 @@
 """Reading of recordings from files of all supported formats, result folders and data frames."""
 
 import io
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -39,11 +38,10 @@ def recording_of_frame(frame: Any, atmosphere: float = STANDARD_ATMOSPHERE) -> R
     Time is a column, the index, or the coordinate of a Dataset; gauge pressures are relative to ``atmosphere`` [Pa
     absolute]. Raises DataError for a table without time, a column without unit and a cell that is no finite number.
     """
-    attributes, named = dict(frame.attrs), _columns_of(frame)
-    columns = _header_of(frame, named)
+    attributes, (header, named) = dict(frame.attrs), _named_columns(frame)
     title, kind = str(attributes.get("title", "")) or "table", str(attributes.get("kind", "measured"))
     values = [_numbers(name, np.asarray(column)) for name, column in named]
-    return recording_of_columns(columns, values, range(len(values[0])), title, recording_kind(kind), atmosphere, "row")
+    return recording_of_columns(header, values, range(len(values[0])), title, recording_kind(kind), atmosphere, "row")
 
 
 def read_parquet(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
@@ -64,11 +62,10 @@ def read_parquet(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> R
         frame.attrs |= {"units": units | frame.attrs.get("units", {}), "title": one_line(Path(path).stem)}
         return frame
 
-    def check_names(schema: "pa.Schema") -> None:
-        frame = framed(schema.empty_table())
-        _header_of(frame, _columns_of(frame))
+    def header(schema: "pa.Schema") -> object:
+        return _named_columns(framed(schema.empty_table()))
 
-    table = parquet.read_parquet(io.BytesIO(read_bytes(path)), str(path), check_schema=check_names)
+    table = parquet.read_parquet(io.BytesIO(read_bytes(path)), str(path), check_schema=header)
     with refused_as(DataError, str(path), DataError, ArrowException):
         return recording_of_frame(framed(table), atmosphere)
 
@@ -94,8 +91,9 @@ def _columns_of(frame: Any) -> list[tuple[str, Any]]:
     return sorted(columns, key=lambda column: not _is_time(column[0]))
 
 
-def _header_of(frame: Any, columns: Sequence[tuple[str, Any]]) -> list[HeaderColumn]:
-    """Return the header of columns with units in their names, in their attributes or in those of the frame."""
+def _named_columns(frame: Any) -> tuple[list[HeaderColumn], list[tuple[str, Any]]]:
+    """Return header and columns, with units in their names, in their attributes or in those of the frame."""
+    columns = _columns_of(frame)
     if hasattr(frame, "data_vars"):
         units = {name: str(column.attrs.get("units", "")) for name, column in columns}
     else:
@@ -107,7 +105,7 @@ def _header_of(frame: Any, columns: Sequence[tuple[str, Any]]) -> list[HeaderCol
         if "[" not in name and (unit or (name == TIME and any(units.values()))):
             head = f"{name} [{PLAIN_NUMBER if unit == '1' else unit or TIME_UNIT}]"
         heads.append(head)
-    return parse_header(heads)
+    return parse_header(heads), columns
 
 
 def _numbers(name: str, column: NDArray[Any]) -> Floats:

@@ -26,8 +26,6 @@ _ANGLES = 8
 """Number of angle intervals between the stops in which the largest torque is searched."""
 _SLOW = math.radians(100.0)
 """Angular velocity [rad/s] of a slow joint: a third of that of an ankle in push-off."""
-_VENTED = 1.0e-6
-"""Gauge pressure over the atmosphere [-] up to which a chamber has no supply."""
 _CHOSEN = "valve"
 """Section of the chosen valve."""
 _OF_SUPPLY = (
@@ -118,7 +116,7 @@ USUAL = {
 
 def unusual_text(device: Device) -> str:
     """Remark on the proportions of a device that are outside their usual range; "" without any."""
-    texts = [_text(USUAL[path], value) for path, value in _unusual(device)]
+    texts = [text for _, text in _unusual(device)]
     return f"unusual device (ppafo sets audit has the sources): {'; '.join(texts)}" if texts else ""
 
 
@@ -127,23 +125,21 @@ def unusual(evidence: Evidence) -> Iterator[AuditFinding]:
     findings = dict[str, AuditFinding]()
     for valve in evidence.parameter_set.valve_kinds:
         with contextlib.suppress(ParameterError), shown_in(evidence.parameter_set.shown):
-            for path, value in _unusual(build_device(evidence.parameter_set, valve)):
-                usual, section = USUAL[path], path.replace(_CHOSEN, f"valves.{valve}")
+            for path, text in _unusual(build_device(evidence.parameter_set, valve)):
+                section = path.replace(_CHOSEN, f"valves.{valve}")
                 paths = [name for name in evidence.parameter_set.numbers if name.startswith(section)]
-                why, name = f"Usual range: {usual.source}", f"proportion-of-{identifier_of(section)}"
-                findings[name] = evidence.finding(name, _text(usual, value), paths, why=why, severity="warning")
+                why, name = f"Usual range: {USUAL[path].source}", f"proportion-of-{identifier_of(section)}"
+                findings[name] = evidence.finding(name, text, paths, why=why, severity="warning")
     yield from findings.values()
 
 
-def _text(usual: UsualRange, value: float) -> str:
-    number, low, high = (shown_text(each, usual.unit, ".3g") for each in (value, usual.low, usual.high))
-    return f"{usual.words} {number} (usual {low} to {high})"
-
-
-def _unusual(device: Device) -> Iterator[tuple[str, float]]:
+def _unusual(device: Device) -> Iterator[tuple[str, str]]:
+    """Yield path of each proportion outside its usual range, and its value and range in words."""
     for path, value in proportions(device):
-        if not USUAL[path].low <= value <= USUAL[path].high:
-            yield path, value
+        words, unit, low, high, _ = USUAL[path]
+        if not low <= value <= high:
+            number, least, most = (shown_text(each, unit, ".3g") for each in (value, low, high))
+            yield path, f"{words} {number} (usual {least} to {most})"
 
 
 def proportions(device: Device) -> Iterator[tuple[str, float]]:
@@ -152,19 +148,18 @@ def proportions(device: Device) -> Iterator[tuple[str, float]]:
     room, turn = plant.atmospheric_pressure, plant.angle_max - plant.angle_min
     yield ATMOSPHERE_PATH, room / STANDARD_ATMOSPHERE
     for path, pressure in ((PRESSURE_PATH, plant.supply_pressure), (SECOND_PRESSURE_PATH, plant.dorsiflexion_pressure)):
-        if abs(pressure - room) > _VENTED * room:
-            yield path, abs(pressure - room) / room
+        # A vented chamber has no supply.
+        if gauge := round(abs(pressure - room) / room, 4):
+            yield path, gauge
     chambers = ACTUATORS[device.actuator.kind].model.chambers
     first, last = (chambers(plant, angle, room, room) for angle in (plant.angle_min, plant.angle_max))
     for number, ends in enumerate(((first.volume_1, last.volume_1), (first.volume_2, last.volume_2)), 1):
         if ends[0] != ends[1]:
             yield f"actuator.dead_volume_{number}", min(ends) / abs(ends[1] - ends[0])
-    # By the density of choked flow a valve passes C p, and the chamber holds V p / (R T).
-    yield (
-        "valve",
-        chamber_mass(1.0, 0.5 * (first.volume_1 + last.volume_1), plant.gas_product) / plant.valve_conductance,
-    )
-    yield "actuator.leak", plant.leak_conductance / plant.valve_conductance
+    if conductance := plant.valve_conductance:
+        # Choked, the valve passes C p, and the chamber holds V p / (R T).
+        yield _CHOSEN, chamber_mass(1.0, 0.5 * (first.volume_1 + last.volume_1), plant.gas_product) / conductance
+        yield "actuator.leak", plant.leak_conductance / conductance
     yield "actuator.displacement_per_radian", plant.displacement_per_radian / plant.torque_constant
     for name, setting in device.valve.settings.items():
         if setting and f"{_CHOSEN}.{name}" in USUAL:
