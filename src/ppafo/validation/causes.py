@@ -473,7 +473,7 @@ class Cause:
         for value, unit in self.numbers.values():
             # An atmosphere in gauge pressure says nothing.
             quantity = "pressure change" if unit == "Pa_a" else quantity_of_unit(unit)
-            said += f" ({Kind('', '' if unit == '-' else unit, quantity).text(value)})"
+            said += f" ({Kind('', '' if unit == '-' else unit, quantity).text(value).removesuffix('_d')})"
         return said
 
     @property

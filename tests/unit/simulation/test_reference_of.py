@@ -86,7 +86,7 @@ def test_a_profile_has_levels_and_differences() -> None:
             "leaves the range of supply and valve.*60 psi_g at 0 s",
         ),
         (document("pressure_2", "-1 psi_g"), "leaves the range of supply and valve.*-1 psi_g"),
-        (document("pressure_difference", "-51 psi_d"), "leaves the range.*-50 psi to 50 psi"),
+        (document("pressure_difference", "-51 psi_d"), "leaves the range.*-50 psi_d to 50 psi_d"),
     ],
     ids=[
         *("beyond stops", "locked", "cascade of torque", "torque law", "fixed point", "name", "unit", "pair", "zone"),
