@@ -216,7 +216,7 @@ def test_an_error_of_the_steps_beyond_what_is_promised_is_said_with_a_tolerance_
     assert simulate("cylinder-servo", [*coarse[:2], f"run.tolerance={told.tolerance:.1g}"]).error().over_promise < 1.0
 
 
-LATE_SINE = ["sensors.delay=10 ms", "reference.frequency=2 Hz", "run.duration=2 s"]
+LATE_SINE = ["sensors.delay=15 ms", "reference.frequency=2 Hz", "run.duration=2 s"]
 """A cylinder whose loop is too late for its sine."""
 
 
@@ -264,7 +264,7 @@ def test_a_judged_part_without_a_peak_gives_no_verdict_and_a_slower_trial_is_lon
     late = load_scenario("cylinder-servo", LATE_SINE)
     verdict = verdict_of(simulate(late))
     # The delay of a sensor is reduced before the task is slower.
-    assert verdict.mended == ("sensors.delay=1 ms",)
+    assert verdict.mended == ("sensors.delay=1.5 ms",)
     slowest = verdict.remedies[-1].overrides
     given = {path: float(text.split()[0]) for path, text in (each.split("=") for each in slowest)}
     assert given["run.duration"] * given["reference.frequency"] >= 1.99
