@@ -260,3 +260,20 @@ def test_a_walker_who_turns_within_the_record_is_remarked(opensim_files: dict[st
         opensim_files["ik"].write_text(f"{top}endheader\n{table}\n")
         found = import_gait(list(opensim_files.values()), ImportSettings(62.0))
         assert any("the walker turns by 80 deg (pelvis_rotation)" in line for line in found.remarks) is is_said
+
+
+@pytest.mark.parametrize(("first", "last", "strikes"), [(190, 390, "1 heel strike"), (10, 200, "0 heel strikes")])
+def test_a_record_of_one_heel_strike_has_no_stride(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording, first: int, last: int, strikes: str
+) -> None:
+    part = {name: values[first:last] for name, values in columns.items()}
+    with pytest.raises(DataError, match=f"{strikes} in vertical_force; a stride needs two"):
+        import_gait([csv_of(part, walk.time[first:last])], ImportSettings(62.0))
+
+
+def test_a_moment_file_without_a_whole_stride_is_named(opensim_files: dict[str, Path]) -> None:
+    path = opensim_files["id"]
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join("nRows=150" if line.startswith("nRows") else line for line in lines[:156]) + "\n")
+    with pytest.raises(DataError, match=r"walk_id.sto: ankle_moment, 0 to .* covers no whole stride"):
+        import_gait(list(opensim_files.values()), ImportSettings(62.0))

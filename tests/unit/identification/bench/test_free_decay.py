@@ -159,3 +159,8 @@ def test_a_recorded_velocity_makes_the_interval_narrower_and_it_holds() -> None:
 def test_a_velocity_in_another_unit_or_direction_is_refused(factor: float, shown: str) -> None:
     with pytest.raises(IdentificationError, match=f"'angular_velocity' is {shown} the derivative of 'angle'"):
         free_decay((with_velocity(factor),))
+
+
+def test_too_few_samples_between_start_and_end_are_refused() -> None:
+    with pytest.raises(IdentificationError, match="at least 20 samples from start to end, not 2"):
+        free_decay((planted.decay(),), start="7.99 s")
