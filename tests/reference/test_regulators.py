@@ -16,14 +16,12 @@ from ppafo.metrics.settled import SettledPart
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.valves.kind import VENT
 from ppafo.model.valves.pressure_regulator import MODEL, STAGE, RegulatorSettings
-from ppafo.parameters.graph import SECOND_PRESSURE_PATH
 from ppafo.parameters.plant import plant_parameters
 from ppafo.parameters.reach import static_torque, supply_for, torque_reach
 from ppafo.remedy_trials import verdict_of
-from ppafo.simulation.loading import load_scenario, scenario_from_dict
+from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
-from ppafo.simulation.tracking.load_causes import _supplies_for
 from ppafo.simulation.tracking.remedies import Case
 from ppafo.simulation.tracking.rule import available_torque
 
@@ -257,11 +255,6 @@ def test_the_torque_reaches_as_far_as_the_set_pressures() -> None:
     assert torque_reach(scenario.device, angle)[1] == pytest.approx(highest)
     assert available_torque(scenario)[1] == pytest.approx(highest)
     assert supply_for(scenario.device, angle, 1.01 * highest) is None
-
-
-def test_an_actuator_with_one_chamber_is_offered_no_second_supply() -> None:
-    bladder = load_scenario("tests/actuators/torque-task-measured-bladder.toml").device
-    assert not _supplies_for(bladder, [(SECOND_PRESSURE_PATH, 1.5, 0.0)], (1.1,))
 
 
 def test_a_pressure_below_the_lowest_set_one_is_the_cause_where_it_lasts() -> None:

@@ -1,33 +1,9 @@
 """A loop that does not move at all says so, and with what it would."""
 
 import numpy as np
-import pytest
 
-from ppafo.loading import load_scenario
 from ppafo.running import simulate
 from ppafo.simulation.tracking.remedies import level_text
-
-
-@pytest.mark.parametrize(
-    ("overrides", "said"),
-    [
-        (("controller.proportional_gain=0 1/Pa", "controller.integral_gain=0 1/(Pa s)"), "the command stays 0"),
-        (
-            (
-                "controller.proportional_gain=1e-8 1/Pa",
-                "controller.integral_gain=0 1/(Pa s)",
-                "valve.dead_band=0.05",
-            ),
-            "opens the valve beyond `valve.dead_band = 0.05`; to try, the more promising one first: overrides=[",
-        ),
-    ],
-    ids=["no gain", "dead band"],
-)
-def test_a_pressure_that_stays_where_it_is_is_named_with_what_keeps_it(overrides: tuple[str, ...], said: str) -> None:
-    verdict = simulate(load_scenario("pressure-loop", (*overrides, "actuator.leak.area=0 mm^2"))).tracking
-    assert verdict.fails
-    assert said in verdict.sentence
-
 
 HELD = ["motion.kind=free", "motion.angle=75 deg", "reference.level=4 N m"]
 """Free joint that the torque task presses with 4 N m."""
