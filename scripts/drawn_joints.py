@@ -23,10 +23,10 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.counterfactuals import verdict_of
 from ppafo.errors import PpafoError
 from ppafo.parameters.declaration import OF_SECOND_CHAMBER
 from ppafo.parameters.reach import torque_reach
-from ppafo.remedy_trials import verdict_of
 from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.simulate import Result, simulate
 

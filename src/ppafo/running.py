@@ -7,13 +7,13 @@ from typing import Any, final
 
 from ppafo.arguments import Overrides, Threads, checked
 from ppafo.arguments.values import accepted_values, shown
+from ppafo.counterfactuals import verdict_of
 from ppafo.engine.run import batch_of
 from ppafo.errors import ArgumentError, SimulationError
 from ppafo.loading import scenario_or_load
 from ppafo.model.sensors import GaitMeasurement, Measurement
 from ppafo.model.valves.kind import VENT
 from ppafo.plugins import Plugins
-from ppafo.remedy_trials import verdict_of
 from ppafo.simulation import simulate as of_loaded
 from ppafo.simulation.contradictions import check_no_bottle
 from ppafo.simulation.plan import plan_run

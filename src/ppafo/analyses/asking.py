@@ -1,12 +1,12 @@
 """Vocabulary of the questions: what they take from the packages below, by one import."""
 
 from ppafo.arguments.values import taken_tasks
+from ppafo.counterfactuals import verdict_of
 from ppafo.loading import load_scenario, placed, reloaded, scenario_or_load, usage_text, with_overrides
 from ppafo.metrics import METRICS, Metric
 from ppafo.metrics.tracking import TRACKING
 from ppafo.parameters.overrides import over
 from ppafo.parameters.parameter_set import PATHS_THAT_SET_UNITS, units_of_texts
-from ppafo.remedy_trials import verdict_of
 from ppafo.report.finding import Column, Finding, Section, columns_of
 from ppafo.report.kind import TIME, ConfidenceInterval, Kind, label_of, of_metric, of_path
 from ppafo.report.panels import Mark, Panel, dots
@@ -18,7 +18,7 @@ from ppafo.simulation.gains import gains_of, remark_on_following_gains
 from ppafo.simulation.numbers import NOISE_SEED, changes_in
 from ppafo.simulation.simulate import Result, Status, simulate_many
 from ppafo.simulation.tracking import Tracking
-from ppafo.simulation.tracking.remedies import change_text
+from ppafo.simulation.tracking.case import change_text
 from ppafo.simulation.tracking.rule import CRITERION_TEXTS, shortfall
 from ppafo.simulation.tracking.verdict import standing_still
 from ppafo.studies.distributions import Distribution, Floats

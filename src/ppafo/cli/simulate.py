@@ -96,7 +96,7 @@ class _RunReport:
 
 def assessed(result: "Result", check: bool) -> _RunReport:
     """Assess a result for its report; ``check`` runs the scenario again to test its repeatability."""
-    from ppafo.remedy_trials import verdict_of
+    from ppafo.counterfactuals import verdict_of
     from ppafo.simulation.gains import gains_of
 
     scenario = result.scenario

@@ -183,6 +183,17 @@ def _present(scenario: Scenario) -> Asked:
     return Asked(lambda path: number_under(scenario, _attributes(path, scenario)))
 
 
+def present_numbers(scenario: Scenario) -> dict[str, float]:
+    """Return the numbers of a single run [SI] by path, without those of an orifice's other form or an absent effect."""
+    named, absent = scenario.device.effects, _numbers_of_other_form(scenario.device)
+    numbers = {}
+    for path in declared_numbers(scenario):
+        section, _, name = path.partition(".")
+        if path not in absent and path != _RATE and (section != EFFECT_SETTINGS or name.partition(".")[0] in named):
+            numbers[path] = number_at(scenario, path)
+    return {**numbers, _RATE: 1.0 / numbers[_PERIOD]}
+
+
 def number_at(scenario: Scenario, path: str) -> float:
     """Return the number at a path of ``declared_numbers`` that is not in ``TIMES``, in SI units."""
     return float(numbers_at(scenario, path))

@@ -9,7 +9,6 @@ from ppafo.engine.in_python import over_samples, over_samples_in
 from ppafo.engine.lanes import Floats
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import Run
-from ppafo.engine.scheme.actuators import pressures_of, torque_of
 from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.metrics import evaluate
 from ppafo.model.controlled import CONTROLLED
@@ -83,13 +82,14 @@ def device_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str,
     temperatures and energies.
     """
     angle, actuator = rows["state.angle"], run.program.actuator
-    pressure_1, pressure_2 = pressures_of(actuator, run.plant, angle, rows["state.mass_1"], rows["state.mass_2"])
+    masses = rows["state.mass_1"], rows["state.mass_2"]
+    pressure_1, pressure_2 = over_samples(actuator.pressures, run.plant, angle, *masses)
     channels: dict[str, tuple[Floats, str]] = {
         "angle": (angle, "rad"),
         "angular_velocity": (rows["state.angular_velocity"], "rad/s"),
         "pressure_1": (pressure_1, "Pa"),
         "pressure_2": (pressure_2, "Pa"),
-        "torque": (np.asarray(torque_of(actuator, run.plant, angle, pressure_1, pressure_2)), "N m"),
+        "torque": (np.asarray(over_samples(actuator.torque, run.plant, angle, pressure_1, pressure_2)), "N m"),
         "command": (rows["result.command"], "-"),
         "supplied_mass": (rows["state.supplied_mass"], "kg"),
         "vented_mass": (rows["state.vented_mass"], "kg"),
@@ -121,7 +121,8 @@ def device_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str,
 def net_torques(run: Run, rows: Mapping[str, Floats], torque: Floats) -> Floats:
     """Net torque [N m] on a vane at each sample; ``torque`` [N m] is the actuator's. Equation (1)."""
     angle, rate, plant = rows["state.angle"], rows["state.angular_velocity"], run.plant
-    pressures = pressures_of(run.program.actuator, plant, angle, rows["state.mass_1"], rows["state.mass_2"])
+    masses = rows["state.mass_1"], rows["state.mass_2"]
+    pressures = over_samples(run.program.actuator.pressures, plant, angle, *masses)
     sliding = _with_effects(run, rows, friction_in_motion, plant.dynamic_torque, rate, *pressures)
     driving = _with_effects(run, rows, driving_torque, plant, torque, angle)
     way = over_samples(direction_of, rate)

@@ -18,7 +18,7 @@ from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.tracking import Tracking, tracking_in
-from ppafo.simulation.tracking.remedies import level_text
+from ppafo.simulation.tracking.case import level_text
 from ppafo.simulation.tracking.verdict import TOO_SHORT
 from ppafo.storage.opensim import opensim_recording, write_opensim
 from ppafo.walking.bottle.coupling import SupplyCourse

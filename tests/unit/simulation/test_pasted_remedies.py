@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
+from ppafo.counterfactuals import verdict_of
 from ppafo.documents.toml_text import table_lines
 from ppafo.loading import load_scenario, reloaded, usage_text
-from ppafo.remedy_trials import verdict_of
 from ppafo.simulation.simulate import simulate
 from ppafo.wording import read_by
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ppafo.running import simulate
-from ppafo.simulation.tracking.remedies import level_text
+from ppafo.simulation.tracking.case import level_text
 
 HELD = ["motion.kind=free", "motion.angle=75 deg", "reference.level=4 N m"]
 """Free joint that the torque task presses with 4 N m."""

@@ -14,7 +14,7 @@ from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.reach import torque_reach
 from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.scenario import UNITS
-from ppafo.simulation.tracking.remedies import remedy
+from ppafo.simulation.tracking.case import overrides_of
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
@@ -273,7 +273,7 @@ def _trials(worn: WalkResult, drags: bool) -> tuple[str, Sequence[tuple[str, ...
     if requested >= _NEARLY * available or "hold_stiffness" not in settings:
         return (
             "the ankle is not lifted enough" if drags else "the torque opposes the motion",
-            [remedy(scenario, pressures).overrides for pressures in raised],
+            [overrides_of(scenario, pressures) for pressures in raised],
             f"more supply pressure alone does not suffice; {other} was not tried",
         )
     limit = {"controller.largest_torque": available} if requested >= _NEARLY * settings["largest_torque"] else {}
@@ -281,11 +281,11 @@ def _trials(worn: WalkResult, drags: bool) -> tuple[str, Sequence[tuple[str, ...
     holds = [*([limit] if limit else []), *({**limit, path: factor * stiffness} for factor in (2.0, 4.0))]
     # A stiffer hold alone comes before one with more pressure: the valve may fill the chamber too slowly.
     filled = [{**hold, **pressures} for hold in holds[-2:] for pressures in raised[:3]]
-    largest = remedy(scenario, holds[-1]).overrides[-1].replace("=", " = ", 1)
+    largest = overrides_of(scenario, holds[-1])[-1].replace("=", " = ", 1)
     return (
         f"the ankle is not lifted enough, as the controller requests {_TORQUE.text(requested)} at the lowest toes, "
         f"where the actuator gives {_TORQUE.text(available)}",
-        [remedy(scenario, numbers).overrides for numbers in (*holds, *filled)],
+        [overrides_of(scenario, numbers) for numbers in (*holds, *filled)],
         f"larger settings up to `{largest}`, alone and with more supply pressure, were simulated and do not suffice",
     )
 

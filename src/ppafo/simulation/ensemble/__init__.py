@@ -63,15 +63,17 @@ class MeteredRuns:
         self.metrics = {name: np.full(runs, np.nan) for name in request.metrics}
         self.traces = {name: np.full((request.times.size, runs), np.nan) for name in request.bands}
 
-    def run_all(self, batches: Sequence[tuple[Members, Batch]], threads: int | None) -> None:
+    def run_all(
+        self, batches: Sequence[tuple[Members, Batch]], threads: int | None, effort: Effort = Effort.FULL
+    ) -> None:
         """Run batches one after the other, each with the indices of its runs in the ensemble."""
         tasks = [_meter_batch(batch, members, self.request) for members, batch in batches]
         # Several programs are compiled side by side before the first batch runs.
-        load_programs((task.batch.program, Effort.FULL) for task in tasks)
+        load_programs((task.batch.program, effort) for task in tasks)
         for task in tasks:
-            self._run(task, threads)
+            self._run(task, threads, effort)
 
-    def _run(self, task: "_MeteredBatch", threads: int | None) -> None:
+    def _run(self, task: "_MeteredBatch", threads: int | None, effort: Effort) -> None:
         """Run a batch and store the results of its runs at their indices in the ensemble."""
         batch, runs_of_batch = task.batch, task.members.size
         states = np.empty_like(batch.states)
@@ -86,7 +88,7 @@ class MeteredRuns:
                 self.traces[name][: len(trace), task.members[runs]] = trace
 
         if self.request.custom is None:
-            run_blocks(batch, store, threads, count=self._count)
+            run_blocks(batch, store, threads, effort, self._count)
         else:
             # A Python controller has one state: it controls one run after the other.
             for run in range(runs_of_batch):
@@ -221,6 +223,7 @@ def run_ensemble(
     gauge: Collection[str] = (),
     errors: bool = False,
     count: Count = report_nothing,
+    effort: Effort = Effort.FULL,
 ) -> EnsembleResult:
     """Run ``base`` once for each row of values; each run gives exactly the same result as alone.
 
@@ -231,7 +234,8 @@ def run_ensemble(
     unknown paths, metrics and channels, and for columns of different lengths; a run whose values are out of range is
     REFUSED and the others continue. Memory grows with the number of runs: use chunks of some ten thousand runs.
     ``errors`` repeats all runs with a sixteenth of the allowed error, which takes four times as long again.
-    ``count`` is called in between with the number of runs that have ended since the last call.
+    ``count`` is called in between with the number of runs that have ended since the last call. ``effort`` is the
+    optimisation level of a program that is not yet compiled: quick compilation suits some hundred short runs.
 
     If a Python object controls ``base``, the runs are made one after the other: some 30 ms each.
 
@@ -258,13 +262,13 @@ def run_ensemble(
     request = OutputRequest(metrics, tuple(dict.fromkeys(bands)), interval, times, base.controller.custom)
     # The runs with finer steps take most of the time.
     runs = MeteredRuns(checked.runs, request, report_nothing if errors else count)
-    runs.run_all(plan.batches, threads)
+    runs.run_all(plan.batches, threads, effort)
     estimated = {}
     if errors:
         # For the metrics alone: nobody asks for the error of a trace.
         metrics_alone = OutputRequest(metrics, (), interval, np.empty(0), base.controller.custom)
         fine = MeteredRuns(checked.runs, metrics_alone, count)
-        fine.run_all(plan_ensemble(checked, finer).batches, threads)
+        fine.run_all(plan_ensemble(checked, finer).batches, threads, effort)
         for name, values in runs.metrics.items():
             # Where the finer run has no value this one may be wrong by anything; without a value it has no error.
             changes = np.where(np.isfinite(fine.metrics[name]), np.abs(fine.metrics[name] - values), np.inf)

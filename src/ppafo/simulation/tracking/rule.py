@@ -502,7 +502,7 @@ def command_turning(scenario: Scenario, metrics: Mapping[str, Floats], most_reve
     turning = np.nan_to_num(metrics.get(REVERSALS, np.zeros(next(iter(metrics.values())).size))) / most_reversals
     if "settled_reversals" not in metrics:
         return turning
-    often = most_reversals / max(float(first(scenario.run.duration)), 1.0)
+    often = most_reversals / np.maximum(scenario.run.duration, 1.0)
     return np.where(is_noisy(scenario), np.nan_to_num(metrics["settled_reversals"]) / often, turning)
 
 

@@ -22,9 +22,8 @@ from ppafo.parameters.overrides import read_overrides
 from ppafo.parameters.reach import torque_reach
 from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.scenario import FreeMotion, Scenario
-from ppafo.simulation.tracking.causes import causes_of_task, causes_of_walk
-from ppafo.simulation.tracking.load_causes import LOCKED, ON_STOP, cuts_wave, stop_of, torque_beyond_reach
-from ppafo.simulation.tracking.remedies import Case, Remedy, TrackingCause, change_text, level_text, rank
+from ppafo.simulation.tracking.case import Case, change_text, level_text
+from ppafo.simulation.tracking.evidence import ON_STOP, Evidence, cuts_wave, evidence_in, stop_of, torque_beyond_reach
 from ppafo.simulation.tracking.rule import (
     CRITERION_TEXTS,
     LARGEST_PEAK,
@@ -65,6 +64,8 @@ _MOST_DOUBLINGS = 11
 
 OPEN_LOOP, NO_REFERENCE, TOO_SHORT = "open loop", "no reference", "too short"
 """Reasons for no verdict."""
+_LOCKED = ("motion.kind=locked",)
+"""Remedy for a free joint that nothing resists."""
 _Judged = tuple[Criterion, float, float]
 """Criterion, number and limit [SI; of reversals per second or stride]."""
 NOTHING_TO_FOLLOW = (OPEN_LOOP, NO_REFERENCE)
@@ -84,10 +85,10 @@ class Tracking:
     the RMS error of the judged part, ``wanted`` the wanted change, ``missing`` the mean error and ``moved`` the range
     of the value, all in SI of the ``controlled`` quantity. In the time ``per`` reversals are counted. ``since`` [s] is
     the start of the judged part, below 0 for a walk, and ``until`` [s] its end, 0 for the end of the run; ``when`` says
-    it. ``cause`` is the cause, with ``advice``; ``remedies`` are the remedies, most promising first; ``others`` are
-    further, less certain causes; ``tried`` is the result of tried remedies, and ``mended`` the overrides with which the
-    run follows. ``accepted`` is the scenario's reason for a torque beyond reach, if that alone keeps the run from its
-    reference, else "".
+    it. ``evidence`` are numbers of the run, each with the changes that would make it a cause. ``cause`` are the changes
+    with which further runs follow, ``tried`` is the remedy among them, and ``mended`` its overrides, all of which
+    ``ppafo.counterfactuals`` finds. ``accepted`` is the scenario's reason for a torque beyond reach, if that alone
+    keeps the run from its reference, else "".
     """
 
     follows: bool | None
@@ -107,10 +108,8 @@ class Tracking:
     since: float = 0.0
     until: float = 0.0
     when: str = ""
+    evidence: tuple[Evidence, ...] = ()
     cause: str = ""
-    advice: str = ""
-    remedies: tuple[Remedy, ...] = ()
-    others: tuple[TrackingCause, ...] = ()
     accepted: str = ""
     tried: str = ""
     mended: tuple[str, ...] = ()
@@ -135,10 +134,7 @@ class Tracking:
         """Verdict in one line; "" if there is nothing to follow."""
         if not self.fails:
             return self.said
-        remedies = [remedy.text for remedy in self.remedies[:2]]
-        order = ", the more promising one first" if len(remedies) > 1 else ""
-        untried = f"to try{order}: {'; '.join(remedies)}" if remedies else self.advice
-        last = f"intended: {self.accepted}" if self.accepted else self.tried or untried
+        last = f"intended: {self.accepted}" if self.accepted else self.tried
         return "; ".join(filter(None, (self.found, self.cause, last)))
 
 
@@ -171,7 +167,6 @@ def tracking_in(result: "RecordedResult") -> Tracking:
 def _failing(case: Case, turning: float, rate: float) -> Tracking:
     """Verdict on a run that does not follow; ``turning`` and ``rate`` [1/s] as of ``_judged``."""
     assert case.failure is not None
-    cause, *others = (causes_of_task if case.scenario.follows_reference else causes_of_walk)(case)
     criterion, number, limit, found = _decided(case, turning, rate)
     settled, walks, settings = case.settled, not case.scenario.follows_reference, case.scenario.controller.settings
     wanted = settings["largest_torque"] if case.overshoots and walks else settled.wanted_change
@@ -191,10 +186,8 @@ def _failing(case: Case, turning: float, rate: float) -> Tracking:
         since=settled.start,
         until=settled.end,
         when=_time_text(settled),
-        cause=cause.text,
-        advice=cause.advice,
-        remedies=tuple(sorted(cause.remedies, key=rank)),
-        others=tuple(other for other in others if other.remedies and other.text != cause.text),
+        evidence=tuple(evidence_in(case)),
+        cause=torque_beyond_reach(case) if case.is_for_reach else "",
         accepted=case.scenario.beyond_reach if case.is_for_reach else "",
     )
 
@@ -292,8 +285,8 @@ def _following(case: Case, _turning: float, _rate: float) -> Tracking:
     # The interval stands before the errors: metrics of the same names cover the whole run.
     said = f"the {controlled.words} follows its reference;{since}: {', '.join(errors)}"
     # A reference just beyond reach is missed by no more than is allowed.
-    beyond = torque_beyond_reach(case) if scenario.follows_reference else None
-    return replace(verdict, said=said if beyond is None else f"{said}; {beyond.text}")
+    beyond = torque_beyond_reach(case) if scenario.follows_reference else ""
+    return replace(verdict, said="; ".join(filter(None, (said, beyond))))
 
 
 def _criteria(case: Case) -> tuple[_Judged, ...]:
@@ -408,7 +401,9 @@ def remarks_on(result: "RecordedResult", follows: bool) -> Iterator[str]:
             lies = "" if share.startswith("0 ") else f" and lies on it for {share}"
             reached += [f"{name} at {recording.time[index]:.3g} s{lies}" for index in at[:1]]
         if reached and follows and scenario.controlled != ANGLE and motion.leg is None:
-            reached[-1] += f": there the stop bears the torque; not tried: lock the joint ({LOCKED.text}) or add a load"
+            reached[-1] += (
+                f": there the stop bears the torque; not tried: lock the joint ({override_text(_LOCKED)}) or add a load"
+            )
     yield from (f"the joint reaches {text}" for text in reached)
     yield _without_effect(scenario)
     yield scenario.origin.replaced
@@ -432,7 +427,7 @@ def standing_still(result: "RecordedResult", follows: bool) -> str:
     exceeds = f"exceeds the largest torque of actuator and load, {level_text('N m', most)}"
     text = f"the joint does not move: static friction of {level_text('N m', holding)} {exceeds}"
     if follows or scenario.controller.is_open_loop:
-        text += f"; not tried: reduce `friction.static_torque`, or lock the joint ({LOCKED.text})"
+        text += f"; not tried: reduce `friction.static_torque`, or lock the joint ({override_text(_LOCKED)})"
     # A joint on which no torque acts is at rest without friction.
     return text if most > SMALLEST_MOVE * holding else ""
 
