@@ -195,6 +195,7 @@ LBF = 4.4482216152605
         *((f"1 {unit}", "m^3/(s Pa)", 1e-8) for unit in ("dm3/(s·bar)", "l/s/bar", "dm^3/(s*bar)", "L/(bar s)")),
         ("60 l/min/bar", "m^3/(s Pa)", 1e-8),
         ("5 mbarl/s", "Pa m^3/s", 0.5),
+        ("3 -", "", 3.0),
         ("60 rpm", "rad/s", 2 * math.pi),
         ("2 h", "s", 7200.0),
         ("3 sec", "s", 3.0),

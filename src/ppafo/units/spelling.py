@@ -313,7 +313,8 @@ def split_pressure_kind(unit: str) -> tuple[str, str]:
     if match := _KIND.fullmatch(normal):
         letter = match["word"][0].lower()
         normal, kind = match["unit"].rstrip(" _"), _LETTER.get(letter, letter)
-    normal = re.sub(r"[A-Za-z]+", lambda word: _symbol(word[0]) or word[0], normal)
+    # A plain number has this unit in tables and results.
+    normal = "1" if normal == "-" else re.sub(r"[A-Za-z]+", lambda word: _symbol(word[0]) or word[0], normal)
     if normal and (len(normal) > _LONGEST or not _EXPRESSION.fullmatch(normal)):
         raise UnitError(f"{quote(unit)} is not a unit; write a unit like 'mm^2', 'N m s/rad' or 'm^3/(s Pa)'")
     spaced = re.sub(r"[A-Za-z]+(?![A-Za-z]|_[gad])", lambda word: _as_product(word[0]) or word[0], normal)
