@@ -1,16 +1,26 @@
 """Gains of angle controllers, derived from the device: SIMC rules for a double integrator (Skogestad 2003).
 
 The angle of a joint responds to the torque T by I angle'' = T, two integrators more than in ``torque_loop``. In a
-cascade the inner loop controls the torque, with the rules of ``torque_loop`` and a total delay of 2 theta, and the
-outer loop requests
+cascade the inner loop controls the torque with the gain k_p, and the outer loop requests
 
-    T = k_a (reference - angle) + d_a (their rates) + feed-forward torque of the joint
-    k_a = I w^2,    d_a = 2 I w
+    T = k_a (reference - angle) + d_a (their rates) + observed load + feed-forward torque of the joint
+    k_p = 3/4 / (R theta),    k_a = I w^2 + S/2,    d_a = I min(2 w, 0.3/theta),    w = 1/(4 theta),    load time = 2/w
 
 For 1/s^2 with a delay of D, and a time constant of D, the rules of S. Skogestad, Journal of Process Control 13 (2003)
-291, give w = 1/(4 D), so w = 1/(8 theta). A joint with large inertia is slower: full opening changes the torque by
-R [N m/s] only, so that a movement over ``travel`` takes (I travel / R)^(1/3) [s], and w is at most the inverse of this
-time. If the static friction exceeds k_a ``travel``, the stiffness is raised accordingly, up to w = 1.7/(8 theta).
+291, give w = 1/(4 D), here for the dead time. The inner loop has a phase margin of 47 deg, the loop of the rate, which
+the dead time and the lag of the inner one delay by 2.3 theta, of 50 deg. The load is observed within 8 theta, the
+integral time of ``torque_loop``.
+
+Gas between closed valves is a spring S [N m/rad]: T' = R u - S angle'. The inner loop has no integral, so that a
+moving joint has S/(k_p R) per rate less torque than it requests. This is a damping, which slows down a joint that is
+light against its gas, to k_a k_p R/S [1/s], and which k_a makes up for by a part of S. With all of S and no d_a the
+mass would oscillate on the gas; half of it is allowed. A valve that regulates pressures leaves no spring.
+
+R is the largest rate, at full flow into the smaller chamber; the margins in motion are about twice as large.
+
+A joint with large inertia is slower: full opening changes the torque by R [N m/s] only, so that a movement over
+``travel`` takes (I travel / R)^(1/3) [s], and w is at most the inverse of this time. If the static friction then
+exceeds k_a ``travel``, w is raised accordingly, up to 1/(4 theta).
 
 A law that opens the valve by the angle error alone acts on one integrator, with the rate R/S at full opening, followed
 by a mass on a gas spring S. Its bandwidth is limited by the natural frequency and damping of this mass, whatever the
@@ -20,15 +30,18 @@ gains. ``slow_loop`` is the corresponding loop.
 import math
 from typing import NamedTuple
 
-from ppafo.control.torque_loop import TorqueLoop, torque_in_dead_time
+from ppafo.control.torque_loop import LEAST_RATE, TorqueLoop, torque_in_dead_time
 from ppafo.model.elementary import power
 
-OUTER_TIMES_INNER = 8.0
-"""1/(w theta): four times the delay of the inner loop, which is two dead times."""
-
-STIFFENED = 1.7
-"""Largest w divided by 1/(8 theta) where static friction requires a stiffness."""
-LOAD_PERIODS = 4.0
+DEAD_TIMES = 4.0
+"""1/(w theta), of a double integrator with a dead time."""
+INNER_GAIN = 0.75
+"""Gain of the inner torque loop times R theta; twice as much makes it oscillate."""
+LARGEST_DAMPING = 0.3
+"""Largest d_a / I times theta."""
+SHARE_OF_SPRING = 0.5
+"""Part of the gas spring in the stiffness k_a; with the whole of it the mass would oscillate on the gas."""
+LOAD_PERIODS = 2.0
 """Time constant of the load observer times w; a faster observer makes the loop oscillate."""
 LEAST_TOLERANCE = math.radians(0.5)
 """Smallest tolerance [rad]: about the play of an orthosis on its wearer, for every drive."""
@@ -50,13 +63,14 @@ THIRD = 1.0 / 3.0
 class Joint(NamedTuple):
     """Joint dynamics for the gains of an angle controller: moving parts on the gas spring of the chambers.
 
-    ``inertia`` [kg m^2], gas ``stiffness`` [N m/rad], viscous ``damping`` [N m s/rad], kinetic ``friction`` [N m],
-    ``static_friction`` [N m], typical ``travel`` per move [rad], largest ``gravity`` torque [N m], ``resolution`` [rad]
-    and ``noise`` [rad] of the angle sensor.
+    ``inertia`` [kg m^2], gas ``stiffness`` [N m/rad], ``shut_in`` [N m/rad] between closed valves at work, viscous
+    ``damping`` [N m s/rad], kinetic ``friction`` [N m], ``static_friction`` [N m], typical ``travel`` per move [rad],
+    largest ``gravity`` torque [N m], ``resolution`` [rad] and ``noise`` [rad] of the angle sensor.
     """
 
     inertia: float
     stiffness: float
+    shut_in: float
     damping: float
     friction: float
     static_friction: float
@@ -67,39 +81,32 @@ class Joint(NamedTuple):
 
 
 def bandwidth(loop: TorqueLoop, joint: Joint) -> float:
-    """Bandwidth w [rad/s], limited by the dead time of the torque loop and by the torque rate over the travel."""
-    by_dead_time = 1.0 / (OUTER_TIMES_INNER * loop.dead_time)
-    return min(
-        by_dead_time, power(max(min(loop.rate, loop.largest_rate), 1.0e-9) / (joint.inertia * joint.travel), THIRD)
-    )
+    """Bandwidth w [rad/s]: by the torque rate over the travel or by the static friction, at most 1/(4 theta)."""
+    by_rate = power(max(min(loop.rate, loop.largest_rate), LEAST_RATE) / (joint.inertia * joint.travel), THIRD)
+    breaking = joint.static_friction / max(joint.travel, LEAST_TOLERANCE) - SHARE_OF_SPRING * joint.shut_in
+    by_friction = math.sqrt(max(breaking, 0.0) / joint.inertia)
+    return min(max(by_rate, by_friction), 1.0 / (DEAD_TIMES * loop.dead_time))
 
 
 def angle_stiffness(loop: TorqueLoop, joint: Joint) -> float:
-    """Gain k_a [N m/rad], requested torque per angle error: I w^2, or more where static friction requires it."""
+    """Gain k_a = I w^2 + S/2 [N m/rad], requested torque per angle error."""
     frequency = bandwidth(loop, joint)
-    stiffest = max(frequency, STIFFENED / (OUTER_TIMES_INNER * loop.dead_time))
-    breaking = joint.static_friction / max(joint.travel, LEAST_TOLERANCE)
-    return min(max(joint.inertia * frequency * frequency, breaking), joint.inertia * stiffest * stiffest)
-
-
-def stiffened(loop: TorqueLoop, joint: Joint) -> float:
-    """Bandwidth w = sqrt(k_a / I) [rad/s] for the gain k_a of ``angle_stiffness``."""
-    return math.sqrt(angle_stiffness(loop, joint) / joint.inertia)
+    return joint.inertia * frequency * frequency + SHARE_OF_SPRING * joint.shut_in
 
 
 def angle_damping(loop: TorqueLoop, joint: Joint) -> float:
-    """Gain d_a = 2 I w [N m s/rad], requested torque per rate of the angle error, for two equal roots."""
-    return 2.0 * joint.inertia * stiffened(loop, joint)
+    """Gain d_a [N m s/rad], requested torque per rate of the angle error: 2 I w, at most 0.3 I / theta."""
+    return joint.inertia * min(2.0 * bandwidth(loop, joint), LARGEST_DAMPING / loop.dead_time)
 
 
 def load_time(loop: TorqueLoop, joint: Joint) -> float:
-    """Time constant [s] of the load observer, 4/w."""
-    return LOAD_PERIODS / stiffened(loop, joint)
+    """Time constant [s] of the load observer, 2/w."""
+    return LOAD_PERIODS / bandwidth(loop, joint)
 
 
 def torque_lag(loop: TorqueLoop, _joint: Joint) -> float:
-    """Time constant 2 theta [s] of the torque loop with the gain 1/(2 R theta)."""
-    return 2.0 * loop.dead_time
+    """Time constant theta / 0.75 [s] of the torque loop with the gain 0.75/(R theta)."""
+    return loop.dead_time / INNER_GAIN
 
 
 def tolerance(_loop: TorqueLoop, joint: Joint) -> float:
@@ -109,7 +116,7 @@ def tolerance(_loop: TorqueLoop, joint: Joint) -> float:
 
 
 def rest_distance(loop: TorqueLoop, joint: Joint) -> float:
-    """Rotation [rad] that counts as motion: more than sensor resolution and noise, and ``REST_RATE`` times 2 theta."""
+    """Rotation [rad] that counts as motion: more than sensor resolution and noise, and ``REST_RATE`` times the lag."""
     unseen = 1.5 * joint.resolution + NOISE_AT_REST * joint.noise
     return max(REST_RATE * torque_lag(loop, joint), unseen)
 
@@ -121,29 +128,19 @@ def rate_filter(loop: TorqueLoop, joint: Joint) -> float:
     time constant is raised up to 0.3/w to respect both limits.
     """
     per_angle = 2.0 * inner_gain(loop, joint) * angle_damping(loop, joint)
-    frequency = stiffened(loop, joint)
+    frequency = bandwidth(loop, joint)
     smoothing = per_angle * max(joint.resolution, NOISE_IN_FILTER * joint.noise)
     return max(min(loop.dead_time, 0.1 / frequency), min(smoothing, 0.3 / frequency))
 
 
 def inner_gain(loop: TorqueLoop, _joint: Joint) -> float:
-    """Gain 1/(2 R theta) [1/(N m)] of the inner torque loop: valve command per torque error."""
-    return 0.5 / torque_in_dead_time(loop)
+    """Gain 0.75/(R theta) [1/(N m)] of the inner torque loop: valve command per torque error."""
+    return INNER_GAIN / torque_in_dead_time(loop)
 
 
 def gravity(_loop: TorqueLoop, joint: Joint) -> float:
     """Largest gravity torque on the joint [N m], as a default for settings."""
     return joint.gravity
-
-
-def friction(_loop: TorqueLoop, joint: Joint) -> float:
-    """Kinetic friction torque of the joint [N m], as a default for settings."""
-    return joint.friction
-
-
-def static_friction(_loop: TorqueLoop, joint: Joint) -> float:
-    """Static friction torque of the joint [N m], as a default for settings."""
-    return joint.static_friction
 
 
 def inertia(_loop: TorqueLoop, joint: Joint) -> float:

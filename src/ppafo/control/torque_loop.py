@@ -18,6 +18,8 @@ from typing import NamedTuple
 
 LEAST_TORQUE = 5.0e-4
 """Smallest torque change within the dead time [N m] for which gains are computed; smaller ones use the same gains."""
+LEAST_RATE = 1.0e-9
+"""Smallest rate of a torque or a pressure that is divided by [SI]."""
 LARGEST_OPENING = 0.77
 """Opening of the dead-zone law for a slow chamber; the rest of the torque change comes from the falling pressure."""
 DEAD_ZONE_SHARE, RELEASE_SHARE = 0.042, 0.0062

@@ -35,6 +35,8 @@ _SAME_NUMBERS = {
     "atmospheric_pressure": "supply.atmospheric_pressure",
     "angle_min": "actuator.angle_min",
     "angle_max": "actuator.angle_max",
+    "friction_torque": "friction.dynamic_torque",
+    "static_torque": "friction.static_torque",
 }
 LEAST_SHARE = 0.05
 """Smallest dead volume as a fraction of the chamber volume at mid-range [-]."""

@@ -17,7 +17,7 @@ from ppafo.constants import STANDARD_GRAVITY, UNIVERSAL_GAS_CONSTANT
 from ppafo.control import angle_loop
 from ppafo.control.angle_loop import Joint
 from ppafo.control.profiles import TABLE, table_bounds
-from ppafo.control.torque_loop import SAMPLES_LATE, TorqueLoop
+from ppafo.control.torque_loop import LEAST_RATE, SAMPLES_LATE, TorqueLoop
 from ppafo.engine.rows import component_row, section_row
 from ppafo.model.actuators.kind import Chambers, Range
 from ppafo.model.actuators.vane import VaneSettings
@@ -37,8 +37,6 @@ from ppafo.simulation.motion_kind import LawSignals
 _TABLES = ("tabulated", "smooth")
 _LEADING = ("constant", "ramp_hold", "sine", *_TABLES)
 """Kinds of profiles whose extreme angles are known."""
-LEAST_RATE = 1.0e-9
-"""Smallest rate of a torque or a pressure that is divided by [SI]."""
 _OF_PAIR = {"opening_delay", "closing_delay", "switching_interval"}
 """Settings of a pair of on/off valves."""
 _OF_PRESSURE = {"pressure_1": (1.0, 0.0), "pressure_2": (0.0, 1.0), "pressure_difference": (1.0, 1.0)}
@@ -48,6 +46,8 @@ INSIDE = 0.2
 """Smallest distance of the right angle from a stop [rad]."""
 LEAST_GAUGE = 1.0
 """Smallest gauge pressure of a supply [Pa], which avoids a division by 0."""
+AT_WORK = 0.3
+"""Gauge pressure of a chamber of a joint in motion, as a part of its supply's [-]."""
 
 
 class Surroundings(NamedTuple):
@@ -473,7 +473,7 @@ def set_reach(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> Non
 
 
 def set_joint(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:
-    """Set the joint of a device with its gas at atmospheric pressure, where the gas spring is softest."""
+    """Set the joint of a device with its gas at atmospheric pressure, where the gas spring is softest, and at work."""
     room = lane.around.atmospheric_pressure
     mean = lane.usual
     inertia = settings["foot_plate.inertia"]
@@ -482,10 +482,15 @@ def set_joint(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> Non
         moment = settings["motion.foot_mass"] * settings["motion.foot_mass_centre"]
         inertia = inertia + settings["motion.foot_inertia"] + moment * settings["motion.foot_mass_centre"]
         weight = weight + moment * STANDARD_GRAVITY
+    spring_1 = mean.torque_per_pressure_1 * mean.growth_1 / mean.volume_1
+    spring_2 = mean.torque_per_pressure_2 * mean.growth_2 / mean.volume_2
+    gauge_1 = lane.around.supply_pressure - room
+    gauge_2 = lane.around.dorsiflexion_pressure - room
+    at_work = spring_1 * (room + AT_WORK * gauge_1) + spring_2 * (room + AT_WORK * gauge_2)
     lane.joint = Joint(
         inertia=inertia,
-        stiffness=mean.torque_per_pressure_1 * mean.growth_1 * room / mean.volume_1
-        + mean.torque_per_pressure_2 * mean.growth_2 * room / mean.volume_2,
+        stiffness=room * (spring_1 + spring_2),
+        shut_in=0.0 if parts.regulates else at_work,
         damping=settings["friction.viscous_damping"],
         friction=settings["friction.dynamic_torque"],
         static_friction=settings["friction.static_torque"],

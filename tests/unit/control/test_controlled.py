@@ -10,6 +10,7 @@ from ppafo.control.angle_loop import (
     angle_damping,
     angle_stiffness,
     bandwidth,
+    load_time,
     rate_filter,
     rest_distance,
     slow_loop,
@@ -69,6 +70,7 @@ LOOP = TorqueLoop(80.0, 2.0e-3, 80.0)
 JOINT = Joint(
     inertia=8.4e-3,
     stiffness=2.0,
+    shut_in=2.0,
     damping=4.0e-3,
     friction=0.02,
     static_friction=0.0,
@@ -79,22 +81,23 @@ JOINT = Joint(
 )
 
 
-def test_two_equal_roots_as_quick_as_dead_time_or_torque_rate_allow() -> None:
+def test_as_quick_as_dead_time_or_torque_rate_allow_and_stiff_against_the_gas() -> None:
     frequency = bandwidth(LOOP, JOINT)
-    assert frequency == pytest.approx(min(1.0 / 0.016, (80.0 / (8.4e-3 * 0.1)) ** (1.0 / 3.0)))
-    # s^2 + (d_a/I) s + k_a/I has one root twice.
-    half = 0.5 * angle_damping(LOOP, JOINT) / JOINT.inertia
-    assert half**2 == pytest.approx(angle_stiffness(LOOP, JOINT) / JOINT.inertia)
+    assert frequency == pytest.approx(min(1.0 / 0.008, (80.0 / (8.4e-3 * 0.1)) ** (1.0 / 3.0)))
+    assert angle_stiffness(LOOP, JOINT) == pytest.approx(8.4e-3 * frequency**2 + 1.0)
+    assert angle_damping(LOOP, JOINT) == pytest.approx(8.4e-3 * min(2.0 * frequency, 0.3 / LOOP.dead_time))
+    assert load_time(LOOP, JOINT) == pytest.approx(2.0 / frequency)
     slow_valve = LOOP._replace(dead_time=0.05)
-    assert bandwidth(slow_valve, JOINT) == pytest.approx(1.0 / 0.4)
+    assert bandwidth(slow_valve, JOINT) == pytest.approx(1.0 / 0.2)
 
 
 def test_static_friction_raises_the_stiffness_up_to_a_cap() -> None:
-    plain = angle_stiffness(LOOP, JOINT)
-    breaking = angle_stiffness(LOOP, JOINT._replace(static_friction=1.5 * plain * JOINT.travel))
-    stuck = angle_stiffness(LOOP, JOINT._replace(static_friction=100.0 * plain * JOINT.travel))
+    heavy = JOINT._replace(inertia=1.0)
+    plain = angle_stiffness(LOOP, heavy)
+    breaking = angle_stiffness(LOOP, heavy._replace(static_friction=1.5 * plain * JOINT.travel))
+    stuck = angle_stiffness(LOOP, heavy._replace(static_friction=1000.0 * plain * JOINT.travel))
     assert breaking == pytest.approx(1.5 * plain)
-    assert stuck == pytest.approx(JOINT.inertia * (1.7 / (8.0 * LOOP.dead_time)) ** 2)
+    assert stuck == pytest.approx((1.0 / (4.0 * LOOP.dead_time)) ** 2 + 1.0)
 
 
 def test_a_coarse_sensor_widens_what_counts_as_there_and_as_motion() -> None:

@@ -215,7 +215,7 @@ def test_an_error_of_the_steps_beyond_what_is_promised_is_said_with_a_tolerance_
     assert simulate("cylinder-servo", [*coarse[:2], f"run.tolerance={told.tolerance:.1g}"]).error().over_promise < 1.0
 
 
-LATE_SINE = ["sensors.delay=10 ms", "reference.frequency=2 Hz", "run.duration=2 s"]
+LATE_SINE = ["sensors.delay=15 ms", "reference.frequency=2 Hz", "run.duration=2 s"]
 """A cylinder whose loop is too late for its sine."""
 
 
@@ -409,7 +409,7 @@ NO_GAIN = ["controller.proportional_gain=0 1/Pa", "controller.integral_gain=0 1/
         ("cylinder-servo", ["controller.rate=20 Hz"], "rate = 20 Hz` is most of the loop's", "controller.rate="),
         ("cylinder-servo", HELD, "`controller.angle_stiffness = 4 N m/rad`", "controller.angle_stiffness="),
         ("cylinder-servo", TOLERANT, "controller.tolerance = 1 deg`", "controller.tolerance="),
-        ("cylinder-servo", LATE_SINE, "`sensors.delay = 10 ms`", ""),
+        ("cylinder-servo", LATE_SINE, "`sensors.delay = 15 ms`", ""),
         ("solenoid", ["run.duration=6 s", "valve.area=0.0126 mm^2"], "with a larger valve", "valve.area="),
         (TASK, [LEVEL, "controller.proportional_gain=95 1/(N m)"], "`controller.proportional_gain = 95", "_gain"),
         (SLOW, ["reference.level=3000 N m"], "50 psi_g the actuator gives at most 5 N m", "reference.level"),

@@ -12,14 +12,12 @@ from ppafo.control.angle_loop import (
     REST_RATE,
     angle_damping,
     angle_stiffness,
-    friction,
     gravity,
     inertia,
     inner_gain,
     load_time,
     rate_filter,
     rest_distance,
-    static_friction,
     tolerance,
     torque_lag,
 )
@@ -88,10 +86,10 @@ class CascadeParameters(NamedTuple):
         float, Number("N m", "believed largest gravity torque, 0 for none", None, -1.0e4, 1.0e4, follows=gravity)
     ]
     static_torque: Annotated[
-        float, Number("N m", "believed static friction, 0 for none", None, 0.0, 1.0e4, follows=static_friction)
+        float, Number("N m", "believed static friction, 0 for none", None, 0.0, 1.0e4, follows="static_torque")
     ]
     friction_torque: Annotated[
-        float, Number("N m", "believed friction in motion, 0 for none", None, 0.0, 1.0e4, follows=friction)
+        float, Number("N m", "believed friction in motion, 0 for none", None, 0.0, 1.0e4, follows="friction_torque")
     ]
     inertia: Annotated[
         float, Number("kg m^2", "believed inertia about the joint, 0 for none", None, 0.0, 1.0e3, follows=inertia)
