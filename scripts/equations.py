@@ -113,6 +113,60 @@ def recorded(case: dict[str, Any]) -> dict[str, Any]:
     return {"recorded": hash_of(tuple(np.asarray(recording[name]) for name in recording.names))}
 
 
+LOCKED = ("motion.kind=locked", "run.step=0.1 ms", "run.output_interval=0.1 ms")
+EMPTYING = (
+    *("motion.kind=locked", "run.duration=40 ms", "controller.command=-1", "actuator.leak.area=1e-6 mm^2"),
+    *("initial.pressure_1=480 kPa_a", "gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=0 W/(m^2 K)"),
+    "gas_model.wall_area_per_volume=100 1/m",
+)
+
+
+def consequences() -> dict[str, float]:
+    """Relative departures [-] of what follows from the equations, whatever function is changed.
+
+    ``start``: first pressures from those asked for, the inverse of equation (3). ``linear``: A and B of the linear
+    model from differences of runs at the same state. ``isentrope``: temperature of a chamber that empties without heat
+    from ``T_0 (P/P_0)^((k - 1)/k)``, whatever the flow law.
+    """
+    import numpy as np
+
+    from ppafo import load_scenario
+    from ppafo.analyses.linearise.model import linear_model
+    from ppafo.running import simulate
+
+    def locked(pressure_1: float, pressure_2: float, command: float) -> Any:
+        numbers = f"initial.pressure_1={pressure_1} kPa_a", f"initial.pressure_2={pressure_2} kPa_a"
+        return load_scenario("step-response", [*LOCKED, *numbers, f"controller.command={command}", "run.duration=1 ms"])
+
+    def pressures_and_rates(*numbers: float) -> Any:
+        recording = simulate(locked(*numbers)).recording
+        before_2, before, now, after, after_2, *_ = np.stack([recording["pressure_1"], recording["pressure_2"]], axis=1)
+        return np.stack([now, (before_2 - 8.0 * before + 8.0 * after - after_2) / (12.0 * 0.1e-3)])
+
+    def change(low: tuple[float, ...], high: tuple[float, ...]) -> Any:
+        return pressures_and_rates(*high) - pressures_and_rates(*low)
+
+    middle = 450.0, 250.0, 0.5
+    by_1, by_2 = change((448.0, 250.0, 0.5), (452.0, 250.0, 0.5)), change((450.0, 248.0, 0.5), (450.0, 252.0, 0.5))
+    by_command = change((450.0, 250.0, 0.49), (450.0, 250.0, 0.51))
+    slopes = np.stack([by_1[1], by_2[1]], axis=1) @ np.linalg.inv(np.stack([by_1[0], by_2[0]], axis=1))
+    gains = (by_command[1] - slopes @ by_command[0]) / 0.02
+    model = linear_model(locked(*middle), "0.2 ms")
+    first = simulate(locked(*middle)).recording
+    emptied = simulate(load_scenario("step-response", EMPTYING))
+    k = emptied.scenario.device.gas.heat_capacity_ratio
+    pressure, temperature = emptied.recording["pressure_1"], emptied.recording["temperature_1"]
+    isentrope = temperature[0] * (pressure / pressure[0]) ** ((k - 1.0) / k)
+    return {
+        "start": float(max(abs(first["pressure_1"][0] / 450e3 - 1.0), abs(first["pressure_2"][0] / 250e3 - 1.0))),
+        "linear": max(
+            float(np.abs(np.asarray(model.A) - slopes).max() / np.abs(slopes).max()),
+            float(np.abs(np.asarray(model.B)[:, 0] / gains - 1.0).max()),
+        ),
+        "isentrope": float(np.abs(temperature / isentrope - 1.0).max()),
+    }
+
+
 def outcome(case: dict[str, Any]) -> dict[str, Any]:
     """What a case does: bits of the run compiled and by Python, of the export in C, its linear model, and errors."""
     import numpy as np
@@ -153,6 +207,8 @@ def outcome(case: dict[str, Any]) -> dict[str, Any]:
         found["open"] = float(np.abs(net - pushed)[2:-2].max() / np.abs(net).max())
     os.environ["PPAFO_BACKEND"] = "python"
     found["python"] = digest(run_batch(batch_of(plan_run(scenario))))
+    if case.get("closes"):
+        found["consequences"] = consequences()
     return found
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import batch_of
-from ppafo.engine.scheme.actuators import volumes_of
+from ppafo.engine.scheme.actuators import filled_chambers
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
@@ -112,7 +112,7 @@ def squeezed(folder: Path, step: float) -> float:
     run = dataclasses.replace(planned, step=step, tolerance=1e9, **counts)
     states = plant_states(run, run_batch(batch_of(run)))
     pressures = chamber_pressures_of(run, states)
-    volumes = volumes_of(run.program.actuator, run.plant, states[:, 0], *pressures)
+    volumes = filled_chambers(run.program.actuator, run.plant, states[:, 0], *pressures)[:2]
     return max(
         float(np.abs(pressure * volume**RATIO / (pressure[0] * volume[0] ** RATIO) - 1.0).max())
         for pressure, volume in zip(pressures, volumes, strict=True)
@@ -138,10 +138,11 @@ def test_what_enters_a_held_chamber_is_energy_of_its_gas_and_work_on_its_wall(tm
     result = simulate(held(tmp_path, *ADIABATIC, "controller.kind=constant", "controller.command=1"))
     record, run = result.recording, plan_run(result.scenario)
     pressure, other = record["pressure_1"], record["pressure_2"]
-    volume, _ = volumes_of(run.program.actuator, run.plant, record["angle"], pressure, other)
+    volume = filled_chambers(run.program.actuator, run.plant, record["angle"], pressure, other).volume_1
     # The wall gives in proportion to the pressure from one measured pressure to the next: few terms are exact.
     grid = np.linspace(pressure[0], pressure[-1], 20001)
-    volumes, _ = volumes_of(run.program.actuator, run.plant, np.full(grid.size, record["angle"][0]), grid, other[0])
+    angles = np.full(grid.size, record["angle"][0])
+    volumes = filled_chambers(run.program.actuator, run.plant, angles, grid, other[0]).volume_1
     wall = float(np.trapezoid(grid, volumes))
     energy = (pressure[-1] * volume[-1] - pressure[0] * volume[0]) / (RATIO - 1.0)
     entered = RATIO / (RATIO - 1.0) * run.plant.gas_product * (record["mass_1"][-1] - record["mass_1"][0])

@@ -27,7 +27,7 @@ from typing import NamedTuple
 from ppafo.documents.regular_file import read_regular_file
 from ppafo.engine.compilers import Compiler, CompilerError
 from ppafo.engine.entries import without_origins
-from ppafo.wording import reason, set_within
+from ppafo.wording import count_of, reason, set_within
 
 logger = logging.getLogger("ppafo")
 
@@ -62,10 +62,9 @@ def cache_folder() -> Path | None:
     import platformdirs
 
     try:
-        folder = Path(platformdirs.user_cache_dir("ppafo", appauthor=False)) / "programs"
+        return Path(platformdirs.user_cache_dir("ppafo", appauthor=False)) / "programs"
     except RuntimeError:
         return None
-    return folder if folder.is_absolute() else None
 
 
 def refusal(folder: Path | None) -> str:
@@ -76,9 +75,7 @@ def refusal(folder: Path | None) -> str:
     if folder is None:
         return "this user has no home folder"
     try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with contextlib.suppress(FileExistsError):
-            folder.mkdir(mode=0o700)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         return _folder_fault(folder)
     except (OSError, ValueError) as error:
         return f"{folder} cannot be created: {reason(error)}"
@@ -159,7 +156,7 @@ def load_or_compile(source: str, compiler: Compiler) -> ModuleType:
             return _kept_module(folder, name, source, compiler) or _compile_into(folder, name, source, compiler)
         except OSError as error:
             logger.warning("ppafo: the compiled model cannot be cached in %s: %s", cache, reason(error))
-    with announce("not kept"):
+    with announce():
         return execute(name, source, Path(f"<{name}>"), compiler.compile_text)
 
 
@@ -200,7 +197,7 @@ def _compile_into(folder: Path, name: str, source: str, compiler: Compiler) -> M
         aside.mkdir(mode=0o700)
         path = aside / f"{name}.py"
         path.write_text(source, encoding="utf-8")
-        with announce(f"kept in {folder.parent}"):
+        with announce():
             module = execute(name, source, path, compiler.compile_text)
         hashes = _checksums(aside, sorted(file.name for file in aside.iterdir() if file.is_file()))
         (aside / CHECKSUMS).write_text(json.dumps(hashes, indent=2), encoding="utf-8")
@@ -227,7 +224,7 @@ def execute(name: str, source: str, path: Path, fill: Callable[[str, str, Module
 
 
 @contextlib.contextmanager
-def announce(where: str, models: int = 1) -> Iterator[None]:
+def announce(models: int = 1) -> Iterator[None]:
     """Log that models are being compiled, once this takes longer than ``QUIET``, and log the end.
 
     Models that are announced together are not announced individually.
@@ -235,8 +232,8 @@ def announce(where: str, models: int = 1) -> Iterator[None]:
     if _models.get():
         yield
         return
-    subject = "a model" if models == 1 else f"{models} models"
-    timer = threading.Timer(QUIET, logger.warning, (f"ppafo: compiling {subject} for this computer ...",))
+    message = f"ppafo: compiling {count_of(models, 'model')} for this computer ..."
+    timer = threading.Timer(QUIET, logger.warning, (message,))
     # A program that ends while it compiles does not wait for the message.
     timer.daemon = True
     start = time.perf_counter()
@@ -250,7 +247,7 @@ def announce(where: str, models: int = 1) -> Iterator[None]:
         timer.join()
     seconds = time.perf_counter() - start
     if seconds >= QUIET:
-        logger.warning("ppafo: compiled in %.1f s, %s", seconds, where)
+        logger.warning("ppafo: compiled in %.1f s", seconds)
 
 
 class CacheEntry(NamedTuple):

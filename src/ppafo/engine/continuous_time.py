@@ -17,10 +17,10 @@ from ppafo.model.plant import (
     ThermalParameters,
     blended_port_flow,
     blended_ports,
-    chamber_mass,
     driving_torque,
     holds_still,
     net_torque,
+    pressures_per_mass,
 )
 from ppafo.model.ports import friction_in_motion
 
@@ -67,11 +67,12 @@ def gas_rates(
 ) -> GasRates:
     """Rates of the gas at an angle [rad] and rate [rad/s], pressures [Pa] and temperatures [K]. Equations (3) to (9).
 
-    Without ``thermal`` the gas is isothermal. The pressures follow from the time derivative of equation (3), d(p V) =
-    R T dm, where the volume of a compliant chamber also changes with its pressure.
+    Without ``thermal`` the gas is isothermal. The pressures follow from the time derivative of equation (3): they rise
+    with the mass and fall with the volume, and the volume of a compliant chamber also changes with its pressure.
     """
-    (pressure_1, pressure_2), product = pressures, plant.gas_product
+    pressure_1, pressure_2 = pressures
     at = chambers_in_motion(plant, motion, pressures, parts=parts)
+    per_mass_1, per_mass_2 = pressures_per_mass(plant.gas_product, at.volume_1, at.volume_2)
     flowing = flows_at(plant, openings, pressure_1, pressure_2)
     if thermal is None:
         flows = flow_rates(flowing)
@@ -80,8 +81,8 @@ def gas_rates(
         warming_1 = 0.0
         warming_2 = 0.0
     else:
-        content_1 = chamber_mass(pressure_1, at.volume_1, product)
-        content_2 = chamber_mass(pressure_2, at.volume_2, product)
+        content_1 = pressure_1 / per_mass_1
+        content_2 = pressure_2 / per_mass_2
         mass_1 = content_1 * thermal.temperature / temperatures[0]
         mass_2 = content_2 * thermal.temperature / temperatures[1]
         found = thermal_flows(thermal, WarmGas(content_1, content_2, mass_1, mass_2), at, flowing)
@@ -94,8 +95,8 @@ def gas_rates(
         # The contents have the work of the moving wall in them: of equation (3) only the volumes are left.
     supplied = flows.supplied_1 + flows.supplied_2
     return GasRates(
-        pressure_1=(product * gained_1 - pressure_1 * at.growth_1) / (at.volume_1 * (1.0 + at.give_1)),
-        pressure_2=(product * gained_2 - pressure_2 * at.growth_2) / (at.volume_2 * (1.0 + at.give_2)),
+        pressure_1=(per_mass_1 * gained_1 - pressure_1 * at.growth_1 / at.volume_1) / (1.0 + at.give_1),
+        pressure_2=(per_mass_2 * gained_2 - pressure_2 * at.growth_2 / at.volume_2) / (1.0 + at.give_2),
         temperature_1=warming_1,
         temperature_2=warming_2,
         supplied=supplied,

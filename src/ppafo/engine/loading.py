@@ -16,7 +16,7 @@ from contextvars import copy_context
 from functools import cache, lru_cache
 from types import ModuleType
 
-from ppafo.engine.cache import announce, cache_folder, is_kept, load_or_compile, program_name, refusal
+from ppafo.engine.cache import announce, is_kept, load_or_compile, program_name
 from ppafo.engine.compilers import OFFERED, Compiler, CompilerError, Effort, UntranslatableError
 from ppafo.errors import ProgramError, SimulationError
 from ppafo.wording import nearest_name, one_line
@@ -108,10 +108,8 @@ def compile_together(programs: Iterable[tuple[str, Effort]], compiler: Compiler)
         return
     from concurrent.futures import ThreadPoolExecutor
 
-    folder = cache_folder()
-    where = "not kept" if refusal(folder) else f"kept in {folder}"
     workers = min(len(missing), os.cpu_count() or 1)
-    with announce(where, len(missing)), ThreadPoolExecutor(workers) as pool:
+    with announce(len(missing)), ThreadPoolExecutor(workers) as pool:
         started = [pool.submit(copy_context().run, compiled, source, effort) for source, effort in missing]
         for task in started:
             task.result()

@@ -84,6 +84,11 @@ def power(base: float, exponent: float) -> float:
     return exponential(exponent * logarithm(base))
 
 
+def raised(base: Numeric, exponent: float) -> Numeric:
+    """Power [-] of a positive base [-]; of an array by NumPy, whose last bits are those of this computer."""
+    return base**exponent if isinstance(base, np.ndarray) else power(base, exponent)
+
+
 def sine_and_cosine(turns: Numeric) -> tuple[Numeric, Numeric]:
     """Sine and cosine [-] of a number or an array of turns, within 2e-16 for exact turns."""
     # To the nearest quarter turn, within which nine terms give all digits.

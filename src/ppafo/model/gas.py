@@ -74,11 +74,11 @@ def mass_flow_ratio(root: float) -> float:
 def enthalpy_flow_ratio(root: float, heat_capacity_ratio: float) -> float:
     """Enthalpy flow divided by c_v T_ref and by the mass flow at the reference temperature [-].
 
-    ``root`` is sqrt(T_up/T_ref) [-]: gas at four times the temperature has half the mass flow and four times the
-    specific enthalpy.
+    ``root`` is sqrt(T_up/T_ref) [-], so that its square is the specific enthalpy relative to that at the reference
+    temperature.
     """
-    # Flow goes as 1/root, enthalpy per mass as root^2, so their product as the root.
-    return heat_capacity_ratio * root
+    specific_enthalpy = heat_capacity_ratio * root * root
+    return specific_enthalpy * mass_flow_ratio(root)
 
 
 def energy_per_content(gas_product: float, heat_capacity_ratio: float) -> float:

@@ -10,8 +10,8 @@ import math
 from typing import Annotated, NamedTuple
 
 from ppafo.constants import STANDARD_REFERENCE_DENSITY_AIR, STANDARD_REFERENCE_TEMPERATURE
-from ppafo.model.columns import root
-from ppafo.model.elementary import power
+from ppafo.model.columns import Numeric, larger, root, smaller
+from ppafo.model.elementary import raised
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio
 
 TERMS = 7
@@ -31,17 +31,17 @@ class FlowCurve(NamedTuple):
     coefficients: Annotated[tuple[float, ...], TERMS]
 
 
-def isentropic_flow_function(pressure_ratio: float, heat_capacity_ratio: float) -> float:
+def isentropic_flow_function(pressure_ratio: Numeric, heat_capacity_ratio: float) -> Numeric:
     """Flow divided by choked flow [-] of an isentropic nozzle, for downstream over upstream pressure. Eqs (6), (7)."""
     critical = critical_pressure_ratio(heat_capacity_ratio)
-    within = min(max(pressure_ratio, critical), 1.0)
+    within: Numeric = smaller(larger(pressure_ratio, critical), 1.0)
     return _subsonic(within, heat_capacity_ratio) / _subsonic(critical, heat_capacity_ratio)
 
 
-def _subsonic(pressure_ratio: float, heat_capacity_ratio: float) -> float:
+def _subsonic(pressure_ratio: Numeric, heat_capacity_ratio: float) -> Numeric:
     """Factor [-] of equation (7) behind ``C2 P_up``."""
     k = heat_capacity_ratio
-    return power(pressure_ratio, 1.0 / k) * math.sqrt(1.0 - power(pressure_ratio, (k - 1.0) / k))
+    return raised(pressure_ratio, 1.0 / k) * root(1.0 - raised(pressure_ratio, (k - 1.0) / k))
 
 
 def subsonic_flow_constant(heat_capacity_ratio: float, gas_constant: float, temperature: float) -> float:
@@ -50,14 +50,11 @@ def subsonic_flow_constant(heat_capacity_ratio: float, gas_constant: float, temp
     return choked_flow_constant(k, gas_constant, temperature) / _subsonic(critical_pressure_ratio(k), k)
 
 
-def iso6358_flow_function(pressure_ratio: float, critical_ratio: float) -> float:
+def iso6358_flow_function(pressure_ratio: Numeric, critical_ratio: float) -> Numeric:
     """Flow divided by choked flow [-] of ISO 6358-1:2013 (index 0.5), for downstream over upstream pressure."""
-    if pressure_ratio <= critical_ratio:
-        return 1.0
-    if pressure_ratio >= 1.0:
-        return 0.0
-    position = (pressure_ratio - critical_ratio) / (1.0 - critical_ratio)
-    return math.sqrt(1.0 - position * position)
+    within: Numeric = smaller(larger(pressure_ratio, critical_ratio), 1.0)
+    position = (within - critical_ratio) / (1.0 - critical_ratio)
+    return root(1.0 - position * position)
 
 
 def fitted_flow_function(pressure_ratio: float, curve: FlowCurve) -> tuple[float, float]:

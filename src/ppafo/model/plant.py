@@ -116,7 +116,7 @@ class Openings(NamedTuple):
     vent_2: float
 
 
-def actuator_torque(pressure_1: float, pressure_2: float, torque_constant: float) -> float:
+def actuator_torque(pressure_1: Numeric, pressure_2: Numeric, torque_constant: float) -> Numeric:
     """Actuator torque [N m], positive in plantarflexion, of two absolute pressures [Pa]. Equation (2)."""
     return torque_constant * (pressure_1 - pressure_2)
 
@@ -210,7 +210,8 @@ def chamber_mass(pressure: float, volume: Numeric, gas_product: float) -> Numeri
 
 
 def pressures_per_mass(gas_product: float, volume_1: Numeric, volume_2: Numeric) -> tuple[Numeric, Numeric]:
-    """Pressures divided by masses [Pa/kg] of two chambers from their volumes [m^3]; a division costs ten products."""
+    """Pressures divided by masses [Pa/kg] of two chambers from their volumes [m^3]. Equation (3)."""
+    # One division for both, which costs ten products.
     per_volumes = gas_product / (volume_1 * volume_2)
     return volume_2 * per_volumes, volume_1 * per_volumes
 

@@ -13,7 +13,7 @@ the step: the regulator's linear part is solved in closed form, so that a small 
 
 from typing import NamedTuple
 
-from ppafo.model.plant import PlantParameters, chamber_mass
+from ppafo.model.plant import PlantParameters, pressures_per_mass
 
 
 class SupplyLines(NamedTuple):
@@ -42,9 +42,10 @@ class LineState(NamedTuple):
 
 def lines_at_start(plant: PlantParameters, lines: SupplyLines) -> LineState:
     """Both lines at the set pressures of their regulators, with a total of 0."""
+    per_mass_1, per_mass_2 = pressures_per_mass(plant.gas_product, lines.volume_1, lines.volume_2)
     return LineState(
-        mass_1=chamber_mass(plant.supply_pressure, lines.volume_1, plant.gas_product),
-        mass_2=chamber_mass(plant.dorsiflexion_pressure, lines.volume_2, plant.gas_product),
+        mass_1=plant.supply_pressure / per_mass_1,
+        mass_2=plant.dorsiflexion_pressure / per_mass_2,
         regulated_mass=0.0,
     )
 
@@ -58,7 +59,8 @@ class LineStep(NamedTuple):
 
 def line_pressures(lines: SupplyLines, gas_product: float, state: LineState) -> tuple[float, float]:
     """Absolute pressures of both lines [Pa]; ``gas_product`` is R T/M [J/kg]. Equation (3)."""
-    return state.mass_1 * gas_product / lines.volume_1, state.mass_2 * gas_product / lines.volume_2
+    per_mass_1, per_mass_2 = pressures_per_mass(gas_product, lines.volume_1, lines.volume_2)
+    return state.mass_1 * per_mass_1, state.mass_2 * per_mass_2
 
 
 def regulated_mass(
@@ -94,8 +96,9 @@ def step_lines(
     ``inlet_rise`` [Pa] is an estimate of line 1's own pressure rise, 0 for a first estimate: it matters where the
     second regulator is fully open because its inlet pressure is below its set pressure.
     """
-    per_mass_1, per_mass_2 = gas_product / lines.volume_1, gas_product / lines.volume_2
-    pressure_1, pressure_2 = line_pressures(lines, gas_product, state)
+    per_mass_1, per_mass_2 = pressures_per_mass(gas_product, lines.volume_1, lines.volume_2)
+    pressure_1 = state.mass_1 * per_mass_1
+    pressure_2 = state.mass_2 * per_mass_2
     stands_open = pressure_1 < set_2
     # Where the second regulator stands open its outlet follows its inlet, which sinks by what it draws.
     passed_2 = regulated_mass(

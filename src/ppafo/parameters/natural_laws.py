@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from ppafo.model.actuators.kind import ActuatorModel
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.model.effects.kind import Effect, PlantSnapshot
-from ppafo.model.plant import blended_port_flow, blended_ports
+from ppafo.model.plant import blended_port_flow, blended_ports, chamber_mass
 from ppafo.model.ports import (
     exhaust_path,
     friction_at_rest,
@@ -87,7 +87,7 @@ def actuator_departure(model: ActuatorModel, plant: Any) -> LawDeparture:
             )
             yielded = abs(wider / (2.0 * push) - given) / scale
             found.append((yielded, math.inf, text))
-        masses = (pressure * volume / plant.gas_product for pressure, volume in zip(pressures, here[:2], strict=True))
+        masses = (chamber_mass(*filled, plant.gas_product) for filled in zip(pressures, here[:2], strict=True))
         filled = model.pressures(plant, angle, *masses)
         text = f"{place} the gas of these pressures gives {_kilopascals(filled[0])} and {_kilopascals(filled[1])}"
         found.append((max(abs(own / each - 1.0) for own, each in zip(filled, pressures, strict=True)), math.inf, text))

@@ -18,6 +18,7 @@ from ppafo.errors import DataError, ParameterError, SimulationError
 from ppafo.model.catalog import VALVES
 from ppafo.model.gas import temperature_flow_factor
 from ppafo.model.orifice import orifice_flow
+from ppafo.model.plant import actuator_torque
 from ppafo.model.sensors import follow, quantise
 from ppafo.model.valves.proportional import spool_position
 from ppafo.parameters.device import VANE, Device, SonicOrifice
@@ -99,15 +100,16 @@ def _static_torque(device: Device, preset: Preset, seed: int) -> dict[str, Float
     sweep = np.concatenate([rising, rising[::-1]])
     scatter = random_stream(seed, "friction").standard_normal((3, sweep.size))
     per_pressure = device.effects.get("seal_friction", {}).get("static_per_pressure", 0.0)
+    constant = device.actuator.torque_constant
     torque = []
     for repetition in preset.values["bench.friction_scatter"] * scatter:
         reading = 0.0
         for number, (pressure, deviation) in enumerate(zip(sweep, repetition, strict=True)):
             # On the way to the turn friction has changed sides, whatever was read before.
             if number == rising.size:
-                reading = device.actuator.torque_constant * _TURN
+                reading = actuator_torque(_TURN, 0.0, constant)
             limit = (device.friction.static_torque + per_pressure * pressure) * max(0.0, 1.0 + deviation)
-            reading = on_scale(reading, device.actuator.torque_constant * pressure, limit)
+            reading = on_scale(reading, actuator_torque(pressure, 0.0, constant), limit)
             torque.append(reading)
     return {
         "torque": np.array(torque),
@@ -363,7 +365,8 @@ def _read(
         errors[name] = {"offset": offset, "gain": gain}
     if is_run and "torque" in true:
         # Of the measured pressures, as a laboratory has it.
-        channels["torque"] = device.actuator.torque_constant * (channels["pressure_1"] - channels["pressure_2"])
+        constant = device.actuator.torque_constant
+        channels["torque"] = actuator_torque(channels["pressure_1"], channels["pressure_2"], constant)
     times = np.arange(len(next(iter(true.values()))), dtype=np.float64) * interval
     described = {name: Channel(values, CHANNELS[name].unit) for name, values in channels.items()}
     return Recording(experiment, times, described, kind="synthetic"), errors

@@ -17,7 +17,7 @@ import numpy as np
 from ppafo.documents.json_text import plain
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
-from ppafo.engine.scheme.actuators import pressures_of, volumes_of
+from ppafo.engine.scheme.actuators import filled_chambers, pressures_of
 from ppafo.errors import SimulationError
 from ppafo.signals.recording import Recording
 from ppafo.simulation.at_hand import RecordedResult
@@ -373,7 +373,7 @@ def start_moved(run: Run, move: float, opposite: float) -> Run:
         angle = min(max(shifted, plant.angle_min), plant.angle_max)
     actuator = run.program.actuator
     pressures = pressures_of(actuator, plant, start.angle, start.mass_1, start.mass_2)
-    before, after = (volumes_of(actuator, plant, vane_angle, *pressures) for vane_angle in (start.angle, angle))
+    before, after = (filled_chambers(actuator, plant, vane_angle, *pressures) for vane_angle in (start.angle, angle))
     # Mass in proportion to volume keeps the pressure, so that only the move itself changes it.
     mass_1 = start.mass_1 * after[0] / before[0] * (1.0 + move)
     mass_2 = start.mass_2 * after[1] / before[1] * (1.0 + opposite * move)

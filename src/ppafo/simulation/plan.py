@@ -16,7 +16,7 @@ from ppafo.control.kind import ProfileKind
 from ppafo.engine.program import Program
 from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import LedLeg, Lines, Run, Walk
-from ppafo.engine.scheme.actuators import volumes_of
+from ppafo.engine.scheme.actuators import filled_chambers, filled_state
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE, is_slow
 from ppafo.errors import ScenarioError
 from ppafo.model.binding import made_of
@@ -25,7 +25,7 @@ from ppafo.model.columns import Problem, at, choose, first, larger, over_runs, r
 from ppafo.model.controlled import OF_TORQUE, TORQUE, error_functions
 from ppafo.model.declaration import EmptyRow
 from ppafo.model.gas import wall_exchange
-from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_mass
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters
 from ppafo.model.sensors import SensorParameters
 from ppafo.parameters.device import Gas
 from ppafo.parameters.effects import effect_rows, effects_of
@@ -219,7 +219,8 @@ def time_grid(scenario: Scenario, plant: PlantParameters) -> TimeGrid:
     # A stricter tolerance counts as a longer step; a looser one as the default.
     step = counts.step / smaller(1.0, tolerance)
     locked_angle = smaller(larger(angle, plant.angle_min), plant.angle_max)
-    volumes = volumes_of(model, plant, locked_angle, plant.atmospheric_pressure, plant.atmospheric_pressure)
+    room = plant.atmospheric_pressure
+    volumes = filled_chambers(model, plant, locked_angle, room, room)[:2]
     return counts, np.logical_not(is_slow(plant, step, *volumes, scenario.stiffness)), tolerance
 
 
@@ -238,7 +239,7 @@ def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
         angle, rate, _ = of_profile(lambda numbers: value(numbers, 0.0), motion.profile)
     pressures = scenario.initial.pressure_1, scenario.initial.pressure_2
     model = ACTUATORS[scenario.device.actuator.kind].model
-    return state_with_volumes(plant, angle, rate, *volumes_of(model, plant, angle, *pressures), *pressures)
+    return filled_state(model, plant, angle, rate, *pressures)
 
 
 def step_counts(duration: float, time_step: float, output_interval: float, period: float) -> StepCounts:
@@ -264,25 +265,4 @@ def thermal_gas(walls: GasModel, gas: Gas) -> ThermalParameters:
     )
     return ThermalParameters(
         heat_capacity_ratio=gas.heat_capacity_ratio, wall_exchange=exchange, temperature=gas.temperature
-    )
-
-
-def state_with_volumes(
-    plant: PlantParameters,
-    angle: Any,
-    angular_velocity: Any,
-    volume_1: float,
-    volume_2: float,
-    pressure_1: float,
-    pressure_2: float,
-) -> PlantState:
-    """Plant state from angle [rad], angular velocity [rad/s], chamber volumes [m^3] and pressures [Pa absolute]."""
-    return PlantState(
-        angle=angle,
-        angular_velocity=angular_velocity,
-        mass_1=chamber_mass(pressure_1, volume_1, plant.gas_product),
-        mass_2=chamber_mass(pressure_2, volume_2, plant.gas_product),
-        supplied_mass=0.0,
-        vented_mass=0.0,
-        leaked_mass=0.0,
     )

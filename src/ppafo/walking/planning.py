@@ -11,13 +11,13 @@ from ppafo.control.walking.outside import OUTSIDE
 from ppafo.engine.in_python import in_program
 from ppafo.engine.rows import of_each
 from ppafo.engine.run import Run, Walk, states_at_start
-from ppafo.engine.scheme.actuators import filled_chambers
+from ppafo.engine.scheme.actuators import filled_chambers, filled_state
 from ppafo.model.actuators.kind import Chambers
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.columns import Problem, at, larger, over_runs, smaller
 from ppafo.model.elementary import QUARTER_TURN
 from ppafo.model.gait import gait_at
-from ppafo.model.plant import PlantParameters
+from ppafo.model.plant import PlantParameters, PlantState
 from ppafo.model.ports import load_torque
 from ppafo.model.sensors import GaitSensors
 from ppafo.parameters.device import Device
@@ -33,7 +33,6 @@ from ppafo.walking.preparation import (
     device_share,
     gait_sensors,
     smallest_chamber,
-    vented_state,
     walk_from_strike,
     walk_step_counts,
     with_leg,
@@ -78,11 +77,17 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         volume = volume if lines is None else smaller(volume, smaller(lines.volume_1, lines.volume_2))
         return walk_step_counts(*times, plant, volume, scenario.stiffness), False, 1.0
 
+    def start(plant: PlantParameters) -> PlantState:
+        """Initial state: both chambers vented."""
+        room = plant.atmospheric_pressure
+        actuator = ACTUATORS[device.actuator.kind].model
+        return filled_state(actuator, plant, now.ankle, now.ankle_rate, room, room)
+
     run, problems = compose_run(
         scenario,
         with_leg(bare, leg),
         steps,
-        lambda plant: vented_state(plant, vented_chambers(device, plant, now.ankle), now.ankle, now.ankle_rate),
+        start,
         walk,
     )
     return run, (*problems, *stiff_loads(run))

@@ -16,9 +16,9 @@ from ppafo.model.contact import HEEL
 from ppafo.model.elementary import exponential
 from ppafo.model.gait import GaitNow
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle
-from ppafo.model.plant import PlantParameters, PlantState
+from ppafo.model.plant import PlantParameters
 from ppafo.model.sensors import GaitSensors
-from ppafo.simulation.plan import WHOLE, StepCounts, state_with_volumes
+from ppafo.simulation.plan import WHOLE, StepCounts
 from ppafo.walking.wearer import HeelRocker
 
 LOWEST_ANGLE, HIGHEST_ANGLE = math.radians(60.0), math.radians(115.0)
@@ -92,12 +92,6 @@ def walk_step_counts(
         steps_per_sample=steps,
         record_every=record_every,
     )
-
-
-def vented_state(plant: PlantParameters, filled: Chambers, angle: float, angular_velocity: float) -> PlantState:
-    """Return the state at an angle [rad] and an angular velocity [rad/s], both chambers at atmospheric pressure."""
-    room = plant.atmospheric_pressure
-    return state_with_volumes(plant, angle, angular_velocity, filled.volume_1, filled.volume_2, room, room)
 
 
 def walk_from_strike(now: GaitNow) -> WalkState:

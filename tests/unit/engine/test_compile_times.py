@@ -33,7 +33,7 @@ def test_models_that_are_needed_together_are_compiled_side_by_side_with_one_mess
     loaded = []
 
     def load(source: str, _effort: Effort) -> ModuleType:
-        with announce("kept"):
+        with announce():
             together.wait()
             time.sleep(0.2)
         loaded.append(source)

@@ -31,6 +31,7 @@ from ppafo.gait import load_gait
 from ppafo.gait.gait import BODY_MASSES
 from ppafo.loading import reloaded
 from ppafo.model.declaration import Number
+from ppafo.model.plant import actuator_torque
 from ppafo.parameters.bottles.bottle import Bottle, load_bottle
 from ppafo.parameters.declared import SHORT_NAME, Many, Words
 from ppafo.parameters.records import SchemaVersion, checked_record, keyed, record_schema
@@ -218,7 +219,7 @@ class SizingProblem:
 
     def ceiling(self, pressure: float) -> float:
         """Return the largest static torque [N m] at a supply pressure [Pa absolute]; equation (2) of the paper."""
-        return self.scenario.device.actuator.torque_constant * (pressure - self.atmosphere)
+        return actuator_torque(pressure, self.atmosphere, self.scenario.device.actuator.torque_constant)
 
 
 @checked

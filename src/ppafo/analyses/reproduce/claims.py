@@ -12,6 +12,7 @@ import numpy as np
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.json_text import fields_of
 from ppafo.errors import ScenarioError, SimulationError, UnitError, refused_as
+from ppafo.model.plant import actuator_torque
 from ppafo.parameters import load_device
 from ppafo.parameters.publications.publication import FILE, PAPER, ClaimEntry, PublicationFile, read_publication
 from ppafo.report.writing import quantity
@@ -231,7 +232,7 @@ def _walked(*overrides: str) -> WalkResult:
 
 def held_torque(pressure: float) -> float:
     """Static torque [N m] at a supply pressure [Pa absolute]: torque constant times gauge pressure. Equation (2)."""
-    return load_device("ppafo2011").actuator.torque_constant * (pressure - STANDARD_ATMOSPHERE)
+    return actuator_torque(pressure, STANDARD_ATMOSPHERE, load_device("ppafo2011").actuator.torque_constant)
 
 
 def share_of_healthy_moment(pressure: float) -> float:

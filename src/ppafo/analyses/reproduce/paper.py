@@ -17,6 +17,7 @@ from ppafo.identification.bench.law import BenchContext, BenchResult
 from ppafo.identification.procedures import LAWS
 from ppafo.identification.source import RecordingSource
 from ppafo.identification.tolerances import Tolerances
+from ppafo.model.plant import actuator_torque
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import findings_of
 from ppafo.parameters.audit.evidence import Evidence, ReportedRange, digits
@@ -655,4 +656,5 @@ def result_on_u(rows: Sequence[InterpretationOfU]) -> tuple[str, ...]:
 def holding_torque(result: Result) -> float:
     """Largest static torque for the supply of a result [N m]; equation (2), other chamber at atmosphere."""
     device = result.scenario.device
-    return device.actuator.torque_constant * (device.supply.pressure - device.supply.atmospheric_pressure)
+    supply = device.supply
+    return actuator_torque(supply.pressure, supply.atmospheric_pressure, device.actuator.torque_constant)

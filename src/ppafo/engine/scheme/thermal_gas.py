@@ -46,6 +46,7 @@ from ppafo.model.plant import (
     PortSlopes,
     ThermalParameters,
     ThermalState,
+    pressures_per_mass,
 )
 
 ALLOWED_OF_TEMPERATURE = 2.5e-4
@@ -253,8 +254,9 @@ def thermal_matrix(
 ) -> ThermalMatrix:
     """Matrix of a step [s] with an energy balance."""
     ratio, weight = thermal.heat_capacity_ratio, GAMMA * step
-    per_content_1 = plant.gas_product / (at.volume_1 * (1.0 + at.give_1))
-    per_content_2 = plant.gas_product / (at.volume_2 * (1.0 + at.give_2))
+    room_1 = at.volume_1 * (1.0 + at.give_1)
+    room_2 = at.volume_2 * (1.0 + at.give_2)
+    per_content_1, per_content_2 = pressures_per_mass(plant.gas_product, room_1, room_2)
     vented_1 = abs(flowing.slopes_1.total - flowing.slopes_1.from_source)
     vented_2 = abs(flowing.slopes_2.total - flowing.slopes_2.from_source)
     turns_1 = vented_1 * (NEARLY_EQUAL * per_content_1 * gas.content_1)

@@ -15,6 +15,7 @@ from ppafo.control.profiles import TabulatedProfile, disordered_knot
 from ppafo.engine.program import Program
 from ppafo.engine.rows import component_row, leaf_paths, numbers, rebuilt, section_row
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
+from ppafo.engine.scheme.actuators import state_at_pressures
 from ppafo.engine.scheme.motion import StepControl
 from ppafo.engine.scheme.pneumatics import is_slow
 from ppafo.engine.scheme.thermal_gas import masses_at_start
@@ -37,7 +38,7 @@ from ppafo.parameters.plant import area_restriction, plant_with, sonic_restricti
 from ppafo.simulation.declaration import LOCKED_ANGLE, SUPPLY_LINE, SUPPLY_LINES, THERMAL_GAS
 from ppafo.simulation.leg import foot_load, with_load
 from ppafo.simulation.numbers import path_of_locked_angle
-from ppafo.simulation.plan import StepCounts, relative_tolerance, state_with_volumes, step_counts, thermal_gas
+from ppafo.simulation.plan import StepCounts, relative_tolerance, step_counts, thermal_gas
 from ppafo.simulation.profiles import ProfileCourse, excursion, profile_parameters, widened
 from ppafo.simulation.scenario import Leg, Scenario, vane_motion
 
@@ -287,9 +288,8 @@ def fill_chambers(parts: Preparation, lane: PreparedLane, settings: Any) -> None
         angular_velocity = settings["motion.angular_velocity"]
     pressure_1 = settings["initial.pressure_1"]
     pressure_2 = settings["initial.pressure_2"]
-    filled = parts.program.actuator.chambers(lane.plant, angle, pressure_1, pressure_2)
-    lane.state = state_with_volumes(
-        lane.plant, angle, angular_velocity, filled.volume_1, filled.volume_2, pressure_1, pressure_2
+    lane.state = state_at_pressures(
+        lane.plant, angle, angular_velocity, pressure_1, pressure_2, parts=parts.program.functions
     )
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from ppafo.engine.rows import component_row, section_row
+from ppafo.engine.scheme.actuators import state_at_pressures
 from ppafo.errors import ScenarioError
 from ppafo.exports.c_library.library import Condition, ExportParameter, Relation
 from ppafo.exports.c_library.preparation import (
@@ -37,7 +38,6 @@ from ppafo.walking.preparation import (
     gait_sensors,
     rocker_on_heel,
     smallest_chamber,
-    vented_state,
     walk_from_strike,
     walk_step_counts,
     with_leg,
@@ -129,11 +129,13 @@ def start_walk(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set the initial leg and gas states, at a heel strike."""
     lane.walk = walk_from_strike(gait_at(lane.gait, lane.gait_timing, lane.leg, 0.0))
     lane.gait_seen = parts.constant(NOTHING_SEEN)
-    lane.state = vented_state(
+    lane.state = state_at_pressures(
         lane.plant,
-        parts.program.actuator.chambers(lane.plant, lane.walk.now.ankle, lane["room"], lane["room"]),
         lane.walk.now.ankle,
         lane.walk.now.ankle_rate,
+        lane["room"],
+        lane["room"],
+        parts=parts.program.functions,
     )
 
 

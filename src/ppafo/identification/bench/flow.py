@@ -31,7 +31,7 @@ from ppafo.identification.tolerances import GAS_LAW as LIMIT_OF_GAS_LAW
 from ppafo.identification.tolerances import Tolerances
 from ppafo.model.declaration import Number
 from ppafo.model.gas import SPECIES, choked_flow_constant, critical_pressure_ratio, specific_gas_constant
-from ppafo.model.orifice import sonic_conductance_mass
+from ppafo.model.orifice import isentropic_flow_function, iso6358_flow_function, sonic_conductance_mass
 from ppafo.parameters.records import keyed
 from ppafo.report.kind import Kind
 from ppafo.report.residuals import curve_mark, with_residuals
@@ -202,24 +202,12 @@ def shown_flow(
 
 def orifice_shape(first: Floats, second: Floats, heat_capacity_ratio: float) -> Floats:
     """Return upstream pressure times flow function [Pa], positive from first to second: (6), (7) divided by Cd A C1."""
-    k = heat_capacity_ratio
-
-    def curve(ratio: Floats) -> Floats:
-        inside = np.maximum(ratio, critical_pressure_ratio(k))
-        flow = np.sqrt(2.0 * k / (k - 1.0)) * inside ** (1.0 / k) * np.sqrt(1.0 - inside ** ((k - 1.0) / k))
-        return np.asarray(flow / np.sqrt(k * (2.0 / (k + 1.0)) ** ((k + 1.0) / (k - 1.0))))
-
-    return _shape(first, second, curve)
+    return _shape(first, second, lambda ratio: isentropic_flow_function(ratio, heat_capacity_ratio))
 
 
 def iso6358_shape(first: Floats, second: Floats, critical_ratio: float) -> Floats:
     """Return upstream pressure times flow function [Pa], positive from first to second: ISO 6358 divided by C rho_0."""
-
-    def curve(ratio: Floats) -> Floats:
-        position = np.maximum(ratio - critical_ratio, 0.0) / (1.0 - critical_ratio)
-        return np.asarray(np.sqrt(1.0 - position**2))
-
-    return _shape(first, second, curve)
+    return _shape(first, second, lambda ratio: iso6358_flow_function(ratio, critical_ratio))
 
 
 def _shape(first: Floats, second: Floats, curve: Callable[[Floats], Floats]) -> Floats:

@@ -21,6 +21,7 @@ from ppafo.engine.rows import leaf_paths, leaves, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.model.cold_gas import DRY_ICE, SupplyNow, SupplyState, advance_supply, open_share
 from ppafo.model.effects.kind import Effect
+from ppafo.model.regulator import line_pressures
 from ppafo.model.source import bottle_content, has_liquid
 from ppafo.parameters.device import Device
 from ppafo.parameters.effects import effect_row
@@ -330,7 +331,8 @@ class _Lanes:
         """Return the gauge pressure of the line, which contains a mass [kg], divided by the set gauge pressure [-]."""
         plant, lines = self.run.plant, self.run.lines
         assert lines is not None, "a bottle feeds lines"
-        pressure = mass * plant.gas_product * now.gas_temperature / (self.start * lines.parameters.volume_1)
+        product = plant.gas_product * now.gas_temperature / self.start
+        pressure, _ = line_pressures(lines.parameters, product, lines.initial._replace(mass_1=mass))
         return (pressure - plant.atmospheric_pressure) / (plant.supply_pressure - plant.atmospheric_pressure)
 
 
