@@ -67,9 +67,9 @@ USUAL = {
     "actuator.displacement_per_radian": UsualRange(
         "displacement over torque constant",
         "",
-        0.5,
-        5.0,
-        "1 by virtual work; judgement: a poor vane gives its shaft a fifth of the work of the gas.",
+        0.2,
+        10.0,
+        "1 by virtual work, 3.5 as printed of the paper's vane; judgement: beyond ten another unit was meant.",
     ),
     "friction.static_torque": UsualRange(
         "static friction over torque ceiling",
@@ -97,7 +97,7 @@ USUAL = {
         "weight over torque ceiling", "", 0.0, 3.0, "Judgement: an assisting device lifts a third of a limb and more."
     ),
     "actuator.leak": UsualRange(
-        "leak over valve", "", 0.0, 0.5, "Judgement: through a leak as wide as the valve no chamber keeps a pressure."
+        "leak over valve", "", 0.0, 0.5, "Judgement: with a leak half as wide as the valve no chamber keeps a pressure."
     ),
     _CHOSEN: UsualRange(
         "time to fill chamber 1 through the open valve",
