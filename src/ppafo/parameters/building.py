@@ -68,7 +68,7 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
     ``links`` replaces the links of the set, if given.
     """
     name = chosen_valve(parameter_set, valve)
-    links = links_of_set(parameter_set) if links is None else links
+    links = links_of_set(parameter_set, name) if links is None else links
     parameter_set = with_followers(parameter_set)
     device = read_device(parameter_set, name, links)
     for _, line in contradictions_of_set(parameter_set, device):

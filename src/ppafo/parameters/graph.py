@@ -22,7 +22,7 @@ TORQUE_CONSTANT_PATH, DISPLACEMENT_PATH = "actuator.torque_constant", "actuator.
 SAME_PRESSURE = 1.0e-6
 """Relative difference [-] below which two pressures in different units count as equal."""
 _LEVEL, _GAUGE = "Pa_a", "_g"
-_COUNTS_FROM_ATMOSPHERE = ("supply.", "initial.", "reference.")
+_COUNTS_FROM_STANDARD = ("controller.", "sensors.")
 
 
 class Asked(dict[str, Any]):
@@ -82,15 +82,15 @@ Graph = Mapping[str, tuple[Link, ...]]
 def fixed_zero(path: str) -> float | None:
     """Return the standard atmosphere [Pa] if it is the gauge zero of a path, None for the device's atmosphere.
 
-    Pressures of supply, start and reference are relative to the atmosphere of the device. Pressures of controllers and
-    sensors are relative to the standard atmosphere, whatever the weather.
+    Pressures of the device, the start and the reference are relative to the atmosphere of the device. Pressures of
+    controllers and sensors are relative to the standard atmosphere, whatever the weather.
     """
-    return None if path.startswith(_COUNTS_FROM_ATMOSPHERE) else STANDARD_ATMOSPHERE
+    return STANDARD_ATMOSPHERE if path.startswith(_COUNTS_FROM_STANDARD) else None
 
 
 def gauge_link(path: str, value: float, unit: str) -> tuple[Link, ...]:
     """Return the link of a gauge pressure to the atmosphere; empty for any other number."""
-    if not unit.endswith(_GAUGE) or path == ATMOSPHERE_PATH or not path.startswith(_COUNTS_FROM_ATMOSPHERE):
+    if not unit.endswith(_GAUGE) or path == ATMOSPHERE_PATH or fixed_zero(path):
         return ()
     return (follows(ATMOSPHERE_PATH, to_si(value, unit, _LEVEL, 0.0)),)
 

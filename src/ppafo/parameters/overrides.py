@@ -211,7 +211,7 @@ def with_overrides(parameter_set: ParameterSet, overrides: Iterable[Override], v
         return parameter_set
     followers = {
         path: overrides_by_path[link.sources[0]]
-        for path, link in acting(links_of_set(parameter_set, overrides_by_path), overrides_by_path).items()
+        for path, link in acting(links_of_set(parameter_set, chosen, overrides_by_path), overrides_by_path).items()
         if link.when
     }
     # A gas brings numbers, and gauge pressures count from the atmosphere, so these two come first.

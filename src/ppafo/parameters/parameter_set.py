@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
@@ -44,6 +45,8 @@ _Origin = Annotated[Origin, Words("origin of the value", allowed=get_args(Origin
 _Source = Annotated[str, Words("source: page, equation, data sheet, recording")]
 _Note = Annotated[str, Words("reason, conflict or remark")]
 SOURCE = "override"
+_OF_NO_DEVICE = ("reported.", "valves.")
+"""Prefixes of the paths of a set that a device with a chosen valve does not have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,9 +251,9 @@ def atmospheric_pressure(parameter_set: ParameterSet) -> float:
 
 
 def links_of_set(
-    parameter_set: ParameterSet, set_paths: Collection[str] = (), atmosphere: float | None = None
+    parameter_set: ParameterSet, valve: str, set_paths: Collection[str] = (), atmosphere: float | None = None
 ) -> dict[str, tuple[Link, ...]]:
-    """Return the links of a parameter set: gauge pressures to the atmosphere, the second regulator to the first.
+    """Return the links of a set with one of its valves: gauge pressures to the atmosphere, a regulator to the other.
 
     The second regulator follows the first if the set has the same pressure for both, unless ``set_paths`` contains only
     the second; of an actuator with one chamber it follows the atmosphere. The pressures are compared at ``atmosphere``
@@ -258,10 +261,11 @@ def links_of_set(
     work, unless the set states it.
     """
     numbers = parameter_set.numbers
+    of_device = {re.sub(f"^valves[.]{re.escape(valve)}[.]", "valve.", path): entry for path, entry in numbers.items()}
     links = {
-        path: gauge_link(path, numbers[path].value, numbers[path].unit)
-        for path in (PRESSURE_PATH, SECOND_PRESSURE_PATH)
-        if path in numbers
+        path: gauge_link(path, entry.value, entry.unit)
+        for path, entry in of_device.items()
+        if not path.startswith(_OF_NO_DEVICE)
     }
     if parameter_set.has_one_chamber:
         # A port between two atmospheres passes nothing, as one that is plugged.

@@ -121,7 +121,7 @@ def read_hardware(reading: DocumentReader) -> tuple[Origin, Graph]:
     changed = with_overrides(set_of_file, overrides, valve)
     kept, texts = "; ".join(filter(None, (replaced, reading.kept))), tuple(item.words for item in reading.overrides)
     origin = Origin(reading.path, set_name, valve_name, texts, reading.content, kept, changed)
-    return origin, links_of_set(changed, overridden, before)
+    return origin, links_of_set(changed, valve_name, overridden, before)
 
 
 _warn_once = functools.lru_cache(maxsize=64)(logger.warning)

@@ -22,6 +22,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.device import Device
 from ppafo.parameters.effects import switches_of
+from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import over
 from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.signals.faults import MINIMUM_SAMPLES
@@ -477,8 +478,13 @@ def _of_device(
     shift its whole error to the static friction.
     """
     scenario = experiments[0].scenario
-    # A parameter linked to another one has no uncertainty of its own, and of an effect that is off no number acts.
-    following = {path for path, links in scenario.device.links.items() if not all(link.when for link in links)}
+    # A parameter linked to another one has no uncertainty of its own, and of an effect that is off no number acts. A
+    # gauge pressure, which counts from the atmosphere, has one.
+    following = {
+        path
+        for path, links in scenario.device.links.items()
+        if not all(link.when or link.direct == (ATMOSPHERE_PATH,) for link in links)
+    }
     off = {effect.section for effect, is_on in switches_of(scenario.device).items() if not is_on}
     skipped = {"motion", "initial", "recording", "motion.shank", "supply", *off}
     for path, quantity in declared_numbers(scenario).items():
