@@ -91,9 +91,13 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
     if heat_varies and WALL_AREA not in values and gas is not None and gas.wall_area_per_volume == 0.0:
         raise ScenarioError(f"{base.name}: the heat transfer varies, but '{WALL_AREA}' is 0; give the wall area")
     (shape,) = set(shapes.values())
-    moved = moving_together(base, absolute(base, values, gauge))
+    columns = absolute(base, values, gauge)
+    is_good = np.logical_and.reduce([_is_in_range(column, declared[path]) for path, column in columns.items()])
+    # A rule for a default need not have a value out of range: runs that are refused have the defaults of another one.
+    places = np.where(is_good, np.arange(is_good.size), np.argmax(is_good))
+    moved = moving_together(base, {path: column[places] for path, column in columns.items()}) if is_good.any() else {}
     # A number that follows may be the same in all runs.
-    varied = {path: number if np.ndim(number) else np.full(shape, number) for path, number in moved.items()}
+    varied = {path: number if np.ndim(number) else np.full(shape, number) for path, number in moved.items()} | columns
     # A number of a second chamber that the actuator does not have may follow, and nothing declares it.
     in_force = {path: declared[path] for path in varied if path in declared}
     return ScenarioColumns(base, varied, in_force, frozenset(values))
@@ -178,8 +182,13 @@ def _out_of_range(columns: ScenarioColumns, path: str) -> Problem:
             return f"{written}: must be a whole number"
         return f"{written}: {range_rule(quantity, unit)}"
 
-    is_good = np.isfinite(values) & is_within(values, quantity)
-    return ~(is_good & (values == np.floor(values)) if quantity.whole else is_good), line
+    return ~_is_in_range(values, quantity), line
+
+
+def _is_in_range(values: Floats, quantity: Quantity) -> NDArray[np.bool_]:
+    """Return whether each number of a column is finite and in range, and whole where it must be."""
+    is_good = np.isfinite(values) & is_within(values, quantity) & (~np.bool_(quantity.whole) | (values == np.floor(values)))
+    return np.asarray(is_good)
 
 
 @dataclass(frozen=True, slots=True)
