@@ -17,7 +17,7 @@ from ppafo.metrics.tracking import ONE_INSTANT
 from ppafo.progress import Progress, Report
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble import COMPLETED, lacking, run_ensemble
-from ppafo.simulation.ensemble.planning import absolute
+from ppafo.simulation.ensemble.planning import absolute, columns_in_range
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking import most_reversals
@@ -231,8 +231,9 @@ def verdicts(
     """
     unknown, most = np.full(len(next(iter(columns.values()))), np.nan), most_reversals(scenario)
     found, turning = TrackingExcess(unknown, unknown, np.zeros_like(unknown), unknown > 0.0), unknown > 0.0
-    if set(needed_metrics(scenario)) & set(metrics):
-        varied = {path: column for path, column in absolute(scenario, columns, gauge).items() if path not in TIMES}
+    in_range = columns_in_range(scenario, absolute(scenario, columns, gauge))
+    if in_range and set(needed_metrics(scenario)) & set(metrics):
+        varied = {path: column for path, column in in_range.items() if path not in TIMES}
         least = smallest_change(scenario) if scenario.follows_reference else 0.0
         found = tracking_excess(with_numbers(scenario, varied), metrics, most, least)
         turning = np.asarray(command_turning(scenario, metrics, most) > 1.0)

@@ -92,10 +92,7 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
         raise ScenarioError(f"{base.name}: the heat transfer varies, but '{WALL_AREA}' is 0; give the wall area")
     (shape,) = set(shapes.values())
     columns = absolute(base, values, gauge)
-    is_good = np.logical_and.reduce([_is_in_range(column, declared[path]) for path, column in columns.items()])
-    # A rule for a default need not have a value out of range: runs that are refused have the defaults of another one.
-    places = np.where(is_good, np.arange(is_good.size), np.argmax(is_good))
-    moved = moving_together(base, {path: column[places] for path, column in columns.items()}) if is_good.any() else {}
+    moved = moving_together(base, columns_in_range(base, columns))
     # A number that follows may be the same in all runs.
     varied = {path: number if np.ndim(number) else np.full(shape, number) for path, number in moved.items()} | columns
     # A number of a second chamber that the actuator does not have may follow, and nothing declares it.
@@ -107,6 +104,18 @@ def absolute(base: Scenario, columns: Mapping[str, Floats], gauge: Collection[st
     """Return the columns with gauge pressures converted to absolute ones by the atmosphere of each run."""
     atmosphere = columns.get(ATMOSPHERE_PATH, base.device.supply.atmospheric_pressure)
     return {path: column + atmosphere if path in gauge else column for path, column in columns.items()}
+
+
+def columns_in_range(base: Scenario, columns: Mapping[str, Floats]) -> dict[str, Floats]:
+    """Return the columns with the numbers of a run in range for each run out of range; empty if all are.
+
+    A rule for a default, or for what a device reaches, need not have a value out of range.
+    """
+    declared = declared_numbers(base)
+    are_good = [_is_in_range(column, declared[chosen_path(path, base)]) for path, column in columns.items()]
+    is_good = np.logical_and.reduce(are_good)
+    places = np.where(is_good, np.arange(is_good.size), np.argmax(is_good))
+    return {path: column[places] for path, column in columns.items()} if is_good.any() else {}
 
 
 @dataclass(slots=True)
