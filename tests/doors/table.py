@@ -381,6 +381,8 @@ REFUSED: tuple[tuple[str, float, str], ...] = (
     ("valve.delay", -1.0, "valve.delay"),
     ("gas.temperature", -5.0, "gas.temperature"),
     ("sensors.delay", -1.0e-3, "sensors.delay"),
+    ("sensors.seed", 1.9, "sensors.seed"),
+    ("actuator.dead_volume_1", 2.0, "actuator.dead_volume_1"),
     ("run.duration", 0.0, "run.duration"),
     ("run.output_interval", 7.0e-3, "run.output_interval"),
     ("controller.period", 1.0e-4, "run.step"),

@@ -99,13 +99,13 @@ class Actuator:
     dead_volume_1: Annotated[
         float,
         Number(
-            "m^3", "line and clearance of chamber 1, added to its swept or tabulated volume", minimum=SMALLEST_VOLUME
+            "m^3", "line and clearance of chamber 1, added to its swept or tabulated volume", None, SMALLEST_VOLUME, 1.0
         ),
     ]
     dead_volume_2: Annotated[
         float,
         Number(
-            "m^3", "line and clearance of chamber 2, added to its swept or tabulated volume", minimum=SMALLEST_VOLUME
+            "m^3", "line and clearance of chamber 2, added to its swept or tabulated volume", None, SMALLEST_VOLUME, 1.0
         ),
     ]
     restitution: float

@@ -79,6 +79,20 @@ def test_an_angle_at_which_a_chamber_has_no_volume_is_refused(angle: float, rate
     assert bytes(run.memory) == before
 
 
+def test_knots_out_of_order_are_refused_by_name(tmp_path: Path) -> None:
+    knots = ("period=0.2 s", "value_01=0 deg", "time_02=20 ms", "value_02=3 deg", "time_03=0.1 s", "value_03=1 deg")
+    path = ("motion.kind=prescribed", "motion.profile.kind=tabulated", "motion.profile.level=80 deg")
+    texts = (*path, *(f"motion.profile.{knot}" for knot in knots))
+    run = Run(tmp_path, ("torque-task-proportional", texts), 1)
+    header = (tmp_path / f"{run.own}.h").read_text(encoding="utf-8")
+    place = re.findall(r"^    double (\w+);", header, re.MULTILINE).index("motion_profile_time_03")
+    bad = run.call("bad_setting")
+    bad.restype = ctypes.c_char_p
+    assert bad(run.settings) is None
+    run.settings[place] = 0.01
+    assert bad(run.settings) == b"motion_profile_time_03"
+
+
 @pytest.mark.parametrize("name", ["cylinder-servo", "pressure-loop"])
 def test_the_plant_of_a_loop_whose_gains_follow_other_numbers_has_neither_gains_nor_reference(name: str) -> None:
     header = next(text for file, text in plant_library(load_scenario(name)).items() if file.endswith(".h")).decode()

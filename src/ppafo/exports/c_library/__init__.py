@@ -18,6 +18,7 @@ from ppafo.exports.c_library.settings import (
     relations_of_vane,
     rules_of_table,
     settings_of,
+    whole_numbers,
 )
 from ppafo.model.catalog import ordered_effects
 from ppafo.model.declaration import PlainFunction
@@ -129,7 +130,7 @@ def library_of(scenario: Scenario) -> Library:
         checking=partial(check_entry, preparation, checks, settings) if has_rules(preparation) else None,
         defaults=frozenset(map(c_identifier, defaults)),
         links=links,
-        rules=(*rules_of_table(scenario, settings), *rules),
+        rules=(*rules_of_table(scenario, settings), *whole_numbers(settings), *rules),
         joint=device.joint,
         actuator=device.actuator.kind,
     )
