@@ -151,3 +151,14 @@ def test_file_that_is_there_is_not_replaced(name: str, tmp_path: Path, capsys: p
     out.unlink()
     assert main([*name.split(), *given, "--out", str(out)]) == 0
     assert out.read_bytes() not in (b"", b"mine")
+
+
+@pytest.mark.parametrize("inside", ["runs", "finished"])
+def test_results_of_a_study_follow_no_link(inside: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
+    out.mkdir()
+    elsewhere.mkdir()
+    (out / inside).symlink_to(elsewhere)
+    assert main(["sweep", "pressure-and-area", "--out", str(out)]) == 2
+    assert f"{inside}: is a link" in capsys.readouterr().err
+    assert not list(elsewhere.iterdir())

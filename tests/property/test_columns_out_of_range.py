@@ -14,9 +14,7 @@ SERVO = ("device.valve=pressure_regulator",)
 @pytest.mark.parametrize(
     ("name", "texts"), [("proportional", ("run.duration=6 s",)), ("cylinder-servo", SERVO), ("pressure-loop", ())]
 )
-def test_rows_far_out_of_range_are_refused_by_name_and_the_others_are_kept(
-    name: str, texts: tuple[str, ...]
-) -> None:
+def test_rows_far_out_of_range_are_refused_by_name_and_the_others_are_kept(name: str, texts: tuple[str, ...]) -> None:
     base, draw = load_scenario(name, texts), np.random.default_rng(108)
     declared = declared_numbers(base)
     numbers = {path: value_at(path, base) for path in declared}
