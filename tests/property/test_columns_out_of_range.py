@@ -7,6 +7,7 @@ from ppafo.loading import load_scenario
 from ppafo.simulation.ensemble.planning import check_columns, screen_columns
 from ppafo.simulation.numbers import declared_numbers
 from ppafo.studies.varying import value_at
+from ppafo.study.runs import RunCounter, scenario_runs
 
 SERVO = ("device.valve=pressure_regulator",)
 
@@ -26,3 +27,9 @@ def test_rows_far_out_of_range_are_refused_by_name_and_the_others_are_kept(name:
         assert sorted([*screened.members.tolist(), *screened.reasons]) == [0, 1, 2, 3, 4]
         assert 0 in screened.members, path
         assert screened.reasons[4] == f"{path} = nan {declared[path].unit}".rstrip() + ": must be a finite number"
+
+
+def test_a_walk_whose_runs_are_all_refused_has_their_reasons() -> None:
+    runs = scenario_runs(load_scenario("proportional"), ["gas_supplied"], RunCounter(2, None))
+    rows = runs.run({"gas.temperature": np.array([-5.0, 1e9])})
+    assert all(line.startswith("gas.temperature = ") for line in rows["reason"])

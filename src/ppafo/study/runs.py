@@ -231,8 +231,8 @@ def verdicts(
     """
     unknown, most = np.full(len(next(iter(columns.values()))), np.nan), most_reversals(scenario)
     found, turning = TrackingExcess(unknown, unknown, np.zeros_like(unknown), unknown > 0.0), unknown > 0.0
-    in_range = columns_in_range(scenario, absolute(scenario, columns, gauge))
-    if in_range and set(needed_metrics(scenario)) & set(metrics):
+    if set(needed_metrics(scenario)) & set(metrics):
+        in_range = columns_in_range(scenario, absolute(scenario, columns, gauge))
         varied = {path: column for path, column in in_range.items() if path not in TIMES}
         least = smallest_change(scenario) if scenario.follows_reference else 0.0
         found = tracking_excess(with_numbers(scenario, varied), metrics, most, least)
