@@ -143,7 +143,7 @@ MISTAKES = {
     "supply_line.plantarflexion.droop=3 Pa s/kg": "must be omitted for a walk with a bottle",
     "bottle.regulator.pressure_margin=8 MPa_d": "the regulator needs",
     "bottle.regulator.set_pressure=30 psi_g": "in a walk, set supply.pressure instead",
-    "bottle.hose.heat_capacity=0.001 J/K": r"hose has a time constant of 0\.0\d+ ms, but a walk needs at least 1 ms",
+    "bottle.hose.heat_capacity=0.001 J/K": r"hose has a time constant of 0\.0\d+ ms: must be at least 1 ms",
     "bottle.wall_heat_capacity=0.001 J/K": r"wall has a time constant",
 }
 

@@ -11,16 +11,11 @@ import numpy as np
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.documents.json_text import fields_of
-from ppafo.errors import DataError, ParameterError, PpafoError, SimulationError, refused_as
-from ppafo.model.cold_gas import heat_to_warm
+from ppafo.errors import DataError, ParameterError, PpafoError, refused_as
+from ppafo.model.cold_gas import heat_to_warm, isobar, open_share
 from ppafo.model.source import (
     BottleContent,
-    BottleState,
     bottle_content,
-    bottle_rates,
-    content_energy,
-    content_temperature,
-    delivered_pressure,
     densest_gas,
     has_liquid,
     pressure_reserve,
@@ -33,7 +28,7 @@ from ppafo.report.kind import TIME, Kind, duration_kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.recording_figure import stated_units, table_at
 from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION
-from ppafo.signals import Channel, Recording
+from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.clock import MAXIMUM_STEPS
 from ppafo.simulation.loading import request_again, scenario_of
@@ -47,8 +42,22 @@ from ppafo.units import format_quantity
 from ppafo.units.shown import in_units, shown_in, shown_text, units_beside, written_text
 from ppafo.version import __version__
 from ppafo.walking import WalkResult
-from ppafo.walking.bottle.coupling import WALKED, Schedule, duration_text, strides_text, walk_on_bottle
-from ppafo.walking.bottle.supply import SET_PRESSURE, is_of_bottle
+from ppafo.walking.bottle.coupling import (
+    ABOVE_FREEZING,
+    LARGEST_DRAW,
+    LEAST_FLOW,
+    OPEN,
+    RESTING,
+    WALKED,
+    Meeting,
+    Schedule,
+    SupplyCourse,
+    duration_text,
+    met_again,
+    strides_text,
+    walk_on_bottle,
+)
+from ppafo.walking.bottle.supply import SET_PRESSURE, BottleSupply, is_of_bottle
 from ppafo.walking.loading import WALKING, on_bottle
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import fed_device
@@ -65,16 +74,12 @@ _MOST_GAS = 1.0e3
 _MOST_RETURNED = 0.1
 """Largest fraction of the gas that may flow back; it stays in the line upstream of the valve for the next stride."""
 TIME_IS_UP = "time is up"
-SAMPLES = 1001
-"""Number of samples of the recording of a discharge."""
 _NEXT_TO_NOTHING = 0.01
 """Usable gas at room temperature, as a fraction of a full bottle, below which a bottle counts as empty [-]."""
-_RELATIVE, _ABSOLUTE = 1e-7, (1e-10, 1e-4, 1e-6, 1e-10, 1e-4, 1e-4)
-"""Tolerances of the ODE solver: relative [-], and absolute for each component of the state [SI]."""
-_ABOVE_FREEZING = 0.02
-"""Temperature [K] above the cold end of the property table at which a run stops, to stay within the table."""
-_BALANCE = ("drawn_mass", "outflow_energy", "room_heat", "mass_change", "content_energy_change", "wall_energy_change")
-"""Mass [kg] and energy [J] across the boundary, and their changes inside."""
+_SHORTEST = 1.0e-3
+"""Time [s] to which the end of a bottle is found."""
+_FASTEST = 20.0
+"""Largest thermal rate [1/s] of a bottle that is drawn for hours."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +155,8 @@ def discharge(
     """Return the duration of a full bottle for a gas use [kg], [s], [kg/s]; while walking, the draw is the mean flow.
 
     The mean replaces the pulses because strides take about a second and bottles cool in minutes. The regulator is
-    checked against the largest flow. Raises SimulationError if the solver fails.
+    checked against the largest flow. Bottle, regulator and hose are those of a walk on the bottle. Raises
+    ParameterError for a largest flow that the full bottle does not give, and for parts that follow too fast.
     """
     mean_flow = mass_per_stride / stride_time
     content = bottle_content(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
@@ -160,30 +166,20 @@ def discharge(
             f"the largest flow is {shown_text(peak_flow, 'kg/s', '.3g')}, but the regulator of the full bottle "
             f"passes at most {shown_text(most, 'kg/s', '.3g')}; increase regulator.area"
         )
-    energy = content_energy(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
-    start = np.array([bottle.mass, energy, bottle.room_temperature, 0.0, 0.0, 0.0])
-    intervals = list[tuple[float, Any]]()
-    time, values, walking, reason = 0.0, start, True, ""
-    while not reason:
-        # Walking and resting take turns; without a rest there is one interval.
-        length = schedule.longest if schedule.rest == 0.0 else (schedule.walk if walking else schedule.rest)
-        end, flow = min(time + length, schedule.longest), mean_flow * walking
-        # An interval may begin without a reserve, and the solver finds crossings only.
-        if intervals and walking and min(reserves(bottle, peak_flow, content_of(bottle, values))) <= 0.0:
-            break
-        solution = _solve_interval(bottle, flow, peak_flow, time, end, values)
-        intervals.append((flow, solution))
-        time, values, walking = float(solution.t[-1]), np.asarray(solution.y[:, -1]), not walking
-        if solution.status == 1:
-            reason = "frozen" if len(solution.t_events[0]) else "short"
-        elif time >= schedule.longest:
-            reason = "time"
-    walked = sum(float(solution.t[-1]) - float(solution.t[0]) for flow, solution in intervals if flow > 0.0)
-    mass, needed = float(values[0]), smallest_mass_when_warm(bottle, peak_flow)
-    usable, change, wall = max(0.0, mass - needed), (values - start).tolist(), bottle.wall
+    line = isobar(bottle.fluid.table, bottle.regulator.set_pressure)
+    supply = BottleSupply(bottle, line, bottle.mass, bottle.room_temperature, least_torque=1.0, coupling=RESTING)
+    if unresolved := supply.unresolved(peak_flow, _FASTEST):
+        raise ParameterError(f"{bottle.name}: {unresolved}")
+    course = SupplyCourse(supply, [Meeting(0.0, supply.start(), supply.offers_first())])
+    reason = _drain(course, mean_flow, peak_flow, schedule)
+    last = course.met[-1]
+    mass = last.state.mass
+    needed = smallest_mass_when_warm(bottle, peak_flow)
+    usable = max(0.0, mass - needed)
     remaining = f"{mass * GRAMS_PER_KILOGRAM:.3g} g are left"
     warm = f"{usable * GRAMS_PER_KILOGRAM:.3g} g of this would be usable at room temperature"
-    pressure_margin, flow_margin = reserves(bottle, peak_flow, content_of(bottle, values))
+    seat_open = open_share(bottle.supply, last.state.ice)
+    pressure_margin, flow_margin = reserves(bottle, peak_flow, last.offered.content, seat_open)
     # Both are fractions, so that the smaller one says what went short first.
     is_pressure = pressure_margin <= flow_margin
     short = "maintain the supply pressure" if is_pressure else "drive the largest flow through the regulator"
@@ -194,6 +190,9 @@ def discharge(
     elif reason == "frozen":
         cold = "the liquid begins to freeze (dry ice)" if has_liquid(bottle.fluid.table) else "the gas is too cold"
         ending, message = "frozen", f"{cold}, and the property table ends here; {remaining}, {warm}"
+    elif flow_margin < pressure_margin and seat_open < OPEN:
+        ending = "iced"
+        message = f"the regulator is iced: dry ice leaves {100.0 * seat_open:.0f} % of the seat open; {remaining}"
     # The gas of a warm bottle decides between the two: cold is mended by waiting, empty is not.
     elif usable > _NEXT_TO_NOTHING * bottle.mass:
         ending, message = "too cold", f"the bottle is too cold: {why}; {remaining}, {warm}"
@@ -207,28 +206,73 @@ def discharge(
         stride_time=stride_time,
         mean_flow=mean_flow,
         peak_flow=peak_flow,
-        walking_time=walked,
-        total_time=time,
-        strides=walked / stride_time,
+        walking_time=course.walked,
+        total_time=last.time,
+        strides=course.walked / stride_time,
         strides_when_warm=(bottle.mass - needed) / mass_per_stride,
         ending=ending,
         message=message,
         mass_left=mass,
         usable_when_warm=usable,
-        balance=dict(zip(_BALANCE, (*change[3:], *change[:2], change[2] * wall.wall_heat_capacity), strict=True)),
+        balance=course.balance,
         shown=units_beside("Pa_a", bottle.entries[SET_PRESSURE].unit),
-        record=partial(_recording, bottle, intervals),
+        record=partial(getattr, course, "recording"),
     )
 
 
-def reserves(bottle: Bottle, peak_flow: float, content: BottleContent) -> tuple[float, float]:
+def _drain(course: SupplyCourse, mean_flow: float, peak_flow: float, schedule: Schedule) -> str:
+    """Continue a course by walking and rest in turn until it ends; return why: "frozen", "short" or "time".
+
+    While walking the mean flow [kg/s] is drawn. The end is found to ``_SHORTEST``.
+    """
+    bottle = course.supply.bottle
+    freezing = bottle.fluid.table.temperatures[0] + ABOVE_FREEZING
+    is_walking = True
+    while course.met[-1].time < schedule.longest:
+        interval = schedule.walk if is_walking else schedule.rest
+        start = course.met[-1]
+        # Without a rest there is one interval.
+        end = min(start.time + interval, schedule.longest) if schedule.rest > 0.0 else schedule.longest
+        # An interval may begin without a reserve.
+        if is_walking and _reserve(course, start, peak_flow) <= 0.0:
+            return "short"
+        flow = mean_flow if is_walking else 0.0
+        length = RESTING
+        while (now := course.met[-1]).time < end:
+            rest = end - now.time
+            largest = LARGEST_DRAW * now.state.mass / max(flow, LEAST_FLOW)
+            length = min(length, rest, largest)
+            time = end if length == rest else now.time + length
+            later = met_again(course.supply, now, flow * length, length, time)
+            is_frozen = later.offered.content.temperature <= freezing
+            is_short = is_walking and _reserve(course, later, peak_flow) <= 0.0
+            if (is_frozen or is_short) and length > _SHORTEST:
+                length *= 0.5
+                continue
+            course.met.append(later)
+            course.regulated += flow * length
+            course.walked += length if is_walking else 0.0
+            course.rested += 0.0 if is_walking else length
+            if is_frozen or is_short:
+                return "frozen" if is_frozen else "short"
+        is_walking = not is_walking
+    return "time"
+
+
+def _reserve(course: SupplyCourse, meeting: Meeting, peak_flow: float) -> float:
+    """Return the smaller margin of pressure and flow [-] at a meeting, with the ice in the seat."""
+    bottle = course.supply.bottle
+    return min(reserves(bottle, peak_flow, meeting.offered.content, open_share(bottle.supply, meeting.state.ice)))
+
+
+def reserves(bottle: Bottle, peak_flow: float, content: BottleContent, seat_open: float = 1.0) -> tuple[float, float]:
     """Return the relative margins of pressure and flow [-] at the largest flow; below 0 the supply pressure is lost.
 
     The pressure margin is the excess over the regulator's need divided by the set pressure; the flow margin is the flow
-    limit of the regulator divided by the largest flow, minus 1.
+    limit of the regulator divided by the largest flow, minus 1. Ice leaves a fraction ``seat_open`` of its seat open.
     """
     to_spare = pressure_reserve(bottle.regulator, content.pressure, peak_flow) / bottle.regulator.set_pressure
-    return to_spare, flow_limit(bottle, content) / peak_flow - 1.0
+    return to_spare, seat_open * flow_limit(bottle, content) / peak_flow - 1.0
 
 
 def flow_limit(bottle: Bottle, content: BottleContent) -> float:
@@ -253,73 +297,6 @@ def smallest_mass_when_warm(bottle: Bottle, peak_flow: float, enough: float = ma
         else:
             high = middle
     return high
-
-
-def _recording(bottle: Bottle, intervals: Sequence[tuple[float, Any]]) -> Recording:
-    """Return the recording of a discharge at uniformly spaced times, from the start to the exact end.
-
-    ``intervals`` are the gas flows [kg/s] and the solutions of walking and rest in turn.
-    """
-    ends = np.array([float(solution.t[-1]) for _, solution in intervals])
-    times = np.linspace(0.0, ends[-1], SAMPLES)
-    # The last time may be beyond the last end by rounding.
-    numbers = np.minimum(np.searchsorted(ends, times, side="left"), len(intervals) - 1)
-    rows = np.array([intervals[number][1].sol(time) for number, time in zip(numbers, times, strict=True)])
-    contents = [content_of(bottle, row) for row in rows]
-    flows = [intervals[number][0] for number in numbers]
-    pressures = [content.pressure for content in contents]
-    channels = {
-        "bottle_mass": (rows[:, 0], "kg"),
-        "bottle_temperature": ([content.temperature for content in contents], "K"),
-        "wall_temperature": (rows[:, 2], "K"),
-        "bottle_pressure": (pressures, "Pa"),
-        "supply_pressure": (list(map(partial(delivered_pressure, bottle.regulator), pressures, flows)), "Pa"),
-        "supplied_mass": (rows[:, 3], "kg"),
-    }
-    if has_liquid(bottle.fluid.table):
-        channels["liquid_mass"] = ([content.liquid_mass for content in contents], "kg")
-    named = {name: Channel(np.asarray(values, dtype=np.float64), unit) for name, (values, unit) in channels.items()}
-    return Recording(f"bottle {bottle.name}", times, named, kind="simulated")
-
-
-def content_of(bottle: Bottle, values: Floats) -> BottleContent:
-    """Return the state of the content of the bottle for its mass [kg] and internal energy [J], the first values."""
-    table, (mass, energy) = bottle.fluid.table, values[:2].tolist()
-    return bottle_content(table, mass, bottle.volume, content_temperature(table, mass, bottle.volume, energy))
-
-
-def _solve_interval(bottle: Bottle, flow: float, peak_flow: float, start: float, end: float, values: Floats) -> Any:
-    """Return SciPy's solution of an interval of walking or, without flow, of rest, from ``start`` to ``end`` [s].
-
-    It ends early at the cold end of the property table and, in walking, where the supply pressure is lost. The state is
-    mass [kg] and energy [J] of the content, temperature of the wall [K], and the cumulative gas [kg], enthalpy [J] and
-    heat from the room [J] across the boundary.
-    """
-    from scipy.integrate import solve_ivp
-
-    def rates(_time: float, y: Floats) -> list[float]:
-        state = BottleState(*y[:3].tolist())
-        now = bottle_rates(content_of(bottle, y), state, flow, bottle.wall, bottle.room_temperature)
-        inside = (now.mass_rate, now.content_energy_rate, now.wall_temperature_rate)
-        return [*inside, flow, now.outflow_power, now.room_heat]
-
-    def kelvins_above_freezing(_time: float, y: Floats) -> float:
-        # The liquid freezes where its table begins; below, the table knows nothing of the gas either.
-        return content_of(bottle, y).temperature - bottle.fluid.table.temperatures[0] - _ABOVE_FREEZING
-
-    def to_spare(_time: float, y: Floats) -> float:
-        return min(reserves(bottle, peak_flow, content_of(bottle, y)))
-
-    events: list[Any] = [kelvins_above_freezing, *([to_spare] if flow > 0.0 else [])]
-    for event in events:
-        # It ends the interval where it falls through 0.
-        event.terminal, event.direction = True, -1.0
-    solution = solve_ivp(
-        rates, (start, end), values, method="LSODA", events=events, dense_output=True, rtol=_RELATIVE, atol=_ABSOLUTE
-    )
-    if solution.status < 0:
-        raise SimulationError(f"the simulation of the bottle failed at {solution.t[-1]:.4g} s: {solution.message}")
-    return solution
 
 
 # Gas use of a walk and of a recording, and the report.

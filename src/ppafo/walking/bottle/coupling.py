@@ -176,16 +176,16 @@ _PARAMETERS = (
 _STRIDES = 2.0
 """Number of strides within which the line pressure must once reach the required level."""
 
-_LARGEST_DRAW = 0.05
+LARGEST_DRAW = 0.05
 """Fraction of the gas in the bottle that may be drawn between two data exchanges, while the supply is constant."""
 
-_LEAST_FLOW = 1.0e-12
+LEAST_FLOW = 1.0e-12
 """Smallest assumed regulator flow [kg/s], which avoids a division by zero."""
-_RESTING = 5.0
+RESTING = 5.0
 """Interval between two states of a bottle during a rest [s]."""
-_ABOVE_FREEZING = 0.02
+ABOVE_FREEZING = 0.02
 """Difference [K] to the lowest temperature of the property table below which the fluid counts as freezing."""
-_OPEN = 0.999
+OPEN = 0.999
 """Fraction of the seat area that is open, above which ice is not the cause of an insufficient flow."""
 
 
@@ -245,8 +245,8 @@ def _walk_once(
     while course.ended is None and done < count and course.walked + course.rested < longest:
         meeting = met[-1]
         # More often where much of what is left may flow out between two meetings.
-        largest_flow = max(meeting.offered.largest_flow, _LEAST_FLOW)
-        most = max(1, min(every, int(_LARGEST_DRAW * meeting.state.mass / (largest_flow * run.step))))
+        largest_flow = max(meeting.offered.largest_flow, LEAST_FLOW)
+        most = max(1, min(every, int(LARGEST_DRAW * meeting.state.mass / (largest_flow * run.step))))
         steps = min(most, count - done, until_rest)
         block.set_parameters(lanes.rows, lanes.parameters(meeting.offered))
         block.advance(steps)
@@ -262,7 +262,7 @@ def _walk_once(
             break
         regulated_mass = float(block.states[regulated, 0].sum())
         drawn, before = regulated_mass - before, regulated_mass
-        met.append(_met_again(supply, meeting, drawn, steps * run.step, time))
+        met.append(met_again(supply, meeting, drawn, steps * run.step, time))
         gauges = [
             *((step, gauge) for step, gauge in gauges if step > done - window),
             (done, min(lanes.gauge(float(block.states[line, 0]), met[-1].offered) for line in lines)),
@@ -270,10 +270,10 @@ def _walk_once(
         course.ended = _ending(supply, met[-1], max(gauge for _, gauge in gauges))
         if course.ended is None and rest > 0.0 and until_rest <= 0 and time < longest:
             resting = min(rest, longest - time)
-            parts = max(1, math.ceil(resting / _RESTING))
+            parts = max(1, math.ceil(resting / RESTING))
             # The bottle warms, and no gas flows.
             for _ in range(parts):
-                met.append(_met_again(supply, met[-1], 0.0, resting / parts, met[-1].time + resting / parts))
+                met.append(met_again(supply, met[-1], 0.0, resting / parts, met[-1].time + resting / parts))
             course.rested += resting
             # Gauges of before the rest say nothing of the bottle that has warmed in it.
             gauges, until_rest = [(done, 1.0)], round(walk / run.step)
@@ -283,7 +283,7 @@ def _walk_once(
     return BatchResult(result.states, record)
 
 
-def _met_again(supply: BottleSupply, meeting: Meeting, drawn: float, duration: float, time: float) -> Meeting:
+def met_again(supply: BottleSupply, meeting: Meeting, drawn: float, duration: float, time: float) -> Meeting:
     """Return the exchange at ``time`` [s], after the device has drawn a mass ``drawn`` [kg] over ``duration`` [s]."""
     table, content = supply.bottle.fluid.table, meeting.offered.content
     state = advance_supply(table, supply.line, supply.bottle.supply, meeting.state, content, drawn, duration)
@@ -345,13 +345,13 @@ def _ending(supply: BottleSupply, meeting: Meeting, reached: float) -> SupplyEnd
     bottle = supply.bottle
     left = _grams(state.mass)
     # Freezing first: it ends the walk even at full torque.
-    if now.content.temperature <= bottle.fluid.table.temperatures[0] + _ABOVE_FREEZING:
+    if now.content.temperature <= bottle.fluid.table.temperatures[0] + ABOVE_FREEZING:
         return SupplyEnding("frozen", f"the fluid in the bottle freezes, with {left} left", time)
     if reached >= supply.least_torque:
         return None
     short = f"the supply gives less than {100.0 * supply.least_torque:.0f} % of the torque"
     # The bottle still has the pressure: the flow is too small, by ice or by the seat itself.
-    if now.set_pressure >= bottle.regulator.set_pressure and open_share(bottle.supply, state.ice) < _OPEN:
+    if now.set_pressure >= bottle.regulator.set_pressure and open_share(bottle.supply, state.ice) < OPEN:
         why = f"dry ice leaves {100.0 * open_share(bottle.supply, state.ice):.0f} % of the seat open"
         return SupplyEnding("iced", f"the regulator is iced: {why}, and {short}; {left} are left", time)
     if now.set_pressure >= bottle.regulator.set_pressure:

@@ -98,6 +98,21 @@ class BottleSupply:
         droop, most = self.bottle.regulator.droop, self.offers_first().largest_flow
         return replace(line, plantarflexion=replace(line.plantarflexion, droop=droop, largest_flow=most))
 
+    def unresolved(self, flow: float, fastest: float) -> str:
+        """Return which part follows a flow [kg/s] at a rate above ``fastest`` [1/s]; empty if none does.
+
+        A bottle of little gas, or a part of little heat capacity, follows within no time.
+        """
+        bottle = self.bottle
+        rates = following_rates(bottle.fluid.table, self.line, bottle.supply, self.mass, flow)
+        part = max(rates, key=rates.__getitem__)
+        if rates[part] <= fastest:
+            return ""
+        constant = f"{1.0e3 / rates[part]:.3g} ms"
+        return (
+            f"the temperature of the {part} has a time constant of {constant}: must be at least {1.0e3 / fastest:g} ms"
+        )
+
     @property
     def assumed(self) -> dict[str, str]:
         """Values of the bottle that are assumed, not taken from a source, by path, each with the reason."""
@@ -190,16 +205,8 @@ def read_bottle(reading: DocumentReader, device: Device) -> BottleSupply | None:
             raise reading.refusal(
                 key, f"must be omitted for a walk with a bottle; set {BOTTLE}.regulator.droop or .area"
             )
-    # Refuse a bottle of so little gas, or parts of so little heat capacity, that they follow within no time.
-    flow = supply.offers_first().largest_flow
-    rates = following_rates(supply.bottle.fluid.table, supply.line, supply.bottle.supply, supply.mass, flow)
-    fastest = max(rates, key=rates.__getitem__)
-    if rates[fastest] > _FASTEST:
-        raise reading.refusal(
-            BOTTLE_NAME,
-            f"the temperature of the {fastest} has a time constant of {1.0e3 / rates[fastest]:.3g} ms, but a walk "
-            f"needs at least {1.0e3 / _FASTEST:g} ms",
-        )
+    if unresolved := supply.unresolved(supply.offers_first().largest_flow, _FASTEST):
+        raise reading.refusal(BOTTLE_NAME, unresolved)
     pressure = supply.offers_first().content.pressure
     if pressure < regulator.set_pressure + regulator.pressure_margin:
         atmosphere, needed = device.supply.atmospheric_pressure, regulator.set_pressure + regulator.pressure_margin

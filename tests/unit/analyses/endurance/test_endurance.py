@@ -51,7 +51,7 @@ def test_the_end_is_where_the_regulator_just_needs_all_that_the_bottle_has() -> 
 
 def test_steps_are_what_was_drawn_over_what_a_step_takes() -> None:
     made = lasting(0.3)
-    assert made.strides == pytest.approx(made.balance["drawn_mass"] / 0.3e-3, rel=1e-9)
+    assert made.strides == pytest.approx(made.balance["regulated"] / 0.3e-3, rel=1e-9)
     assert made.walking_time == pytest.approx(made.strides * 1.1, rel=1e-9)
 
 

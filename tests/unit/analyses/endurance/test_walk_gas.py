@@ -3,10 +3,11 @@
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import ppafo
-from ppafo.analyses.endurance.discharge import Endurance, gas_of_walk, largest_flow
+from ppafo.analyses.endurance.discharge import Endurance, discharge, gas_of_walk, largest_flow
 from ppafo.analyses.endurance.question import bottle as endurance
 from ppafo.cli.main import main
 from ppafo.errors import DataError, ScenarioError
@@ -14,6 +15,7 @@ from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.numbers import with_numbers
 from ppafo.walking import WalkResult, load_walk, walk
+from ppafo.walking.bottle.coupling import Schedule
 from ppafo.walking.loading import on_bottle
 from ppafo.walking.motion import walk_of, with_duration
 
@@ -59,6 +61,15 @@ def test_the_gas_on_a_bottle_differs_by_its_regulator_and_its_cold() -> None:
     alone = ppafo.walk("solenoid", overrides=causes, minutes=0.2).metrics["gas"].value
     assert alone == pytest.approx(found.mass_per_stride, rel=0.01)
     assert alone < 0.97 * walked.metrics["gas"].value
+    # The same bottle under the mean flow of the walk: as cold where as much gas is left.
+    mean = discharge(found.bottle, found.mass_per_stride, found.stride_time, found.mean_flow, Schedule(60.0, 0.0, 60.0))
+    drawn = np.linspace(0.008, 0.016, 9)
+    for name in ("bottle_temperature", "wall_temperature", "hose_temperature"):
+        of_walk, of_mean = (
+            np.interp(drawn, recording["bottle_mass"][::-1], recording[name][::-1])
+            for recording in (found.recording, mean.recording)
+        )
+        assert np.abs(of_walk - of_mean).max() < 0.3  # K: a stride takes a twentieth of this bottle
 
 
 def test_a_warm_bottle_ends_as_the_walk_does_and_gives_no_fewer_strides() -> None:
