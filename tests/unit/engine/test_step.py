@@ -14,7 +14,10 @@ import pytest
 
 from ppafo.engine.compilers import FLAGS, Effort
 from ppafo.engine.run import batch_of
+from ppafo.engine.scheme.actuators import filled_state
 from ppafo.engine.step import foot, gas, lines, meters, phases, sample, stated, walk
+from ppafo.model.actuators.vane import MODEL as VANE
+from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from scripts.built_programs import program_source
@@ -66,3 +69,10 @@ def test_loops_over_lanes_are_vectorised(name: str, overrides: tuple[str, ...], 
     ]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
     assert len(set(VECTORISED.findall(done.stderr))) >= least
+
+
+def test_an_evacuated_chamber_begins_without_gas() -> None:
+    plant = plant_parameters(load_scenario("step-response").device)
+    filled = filled_state(VANE, plant, 1.0, 0.0, 0.0, 2.0e5)
+    assert filled.mass_1 == 0.0
+    assert filled.mass_2 > 0.0

@@ -57,11 +57,20 @@ def state_at_pressures(
     mass_1 = chamber_mass(pressure_1, filled.volume_1, plant.gas_product)
     mass_2 = chamber_mass(pressure_2, filled.volume_2, plant.gas_product)
     reached_1, reached_2 = parts.pressures(plant, angle, mass_1, mass_2)
+    # An evacuated chamber, as of a dead sensor in a recording, has no proportion.
     return PlantState(
         angle=angle,
         angular_velocity=angular_velocity,
-        mass_1=choose(abs(reached_1 - pressure_1) > SAME * pressure_1, mass_1 * pressure_1 / reached_1, mass_1),
-        mass_2=choose(abs(reached_2 - pressure_2) > SAME * pressure_2, mass_2 * pressure_2 / reached_2, mass_2),
+        mass_1=choose(
+            abs(reached_1 - pressure_1) > SAME * pressure_1,
+            mass_1 * pressure_1 / choose(reached_1 > 0.0, reached_1, 1.0),
+            mass_1,
+        ),
+        mass_2=choose(
+            abs(reached_2 - pressure_2) > SAME * pressure_2,
+            mass_2 * pressure_2 / choose(reached_2 > 0.0, reached_2, 1.0),
+            mass_2,
+        ),
         supplied_mass=0.0,
         vented_mass=0.0,
         leaked_mass=0.0,
