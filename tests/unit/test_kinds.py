@@ -89,6 +89,7 @@ def test_a_name_of_one_of_our_own_is_refused_by_name(install: Install) -> None:
     assert CONTROLLERS["pid"] is ours
 
 
+@pytest.mark.usefixtures("install")
 def test_a_law_of_the_working_folder_is_named_and_no_file_alone_runs_code(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
