@@ -157,3 +157,12 @@ METRICS = (
     _kind("total_gas", "kg", "gas taken from the supply in the whole walk", "gas first_gas", less),
 )
 """Metrics of a walk computed without mean curve and healthy gait."""
+
+OF_MEAN_STRIDE = {
+    "healthy_positive_work": ("J", "positive work of the healthy ankle in one stride"),
+    "push_off_share": ("-", "positive work of T_ex in push-off over the healthy ankle's positive work"),
+    "dorsiflexor_moment": ("N m", "moment of the wearer's dorsiflexors, mean over the stride"),
+    "lowest_toes": ("m", "lowest toe height above ground in mid-swing of the mean stride; below 0 the toes would drag"),
+    "angle_difference": ("rad", "RMS difference of the mean ankle angle to the healthy one"),
+}
+"""Units and meanings of the other metrics of a walk, by name: of its mean stride and of the healthy gait."""

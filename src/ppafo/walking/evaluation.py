@@ -8,7 +8,7 @@ import numpy as np
 
 from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.run import Run
-from ppafo.metrics import METRICS, Metric, evaluate
+from ppafo.metrics import METRICS, evaluate
 from ppafo.metrics.command import command_reversals, peak_torque, requested_samples
 from ppafo.metrics.metric import MetricKind, Metrics
 from ppafo.metrics.strides import PER_STRIDE, SETTLING
@@ -28,7 +28,14 @@ from ppafo.walking.gait_series import ankle_path
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of, requests_torque
 from ppafo.walking.result import WalkResult
-from ppafo.walking.strides import healthy_positive_work, lowest_toes, mean_curves, per_stride, stride_starts
+from ppafo.walking.strides import (
+    healthy_positive_work,
+    lowest_toes,
+    mean_curves,
+    metrics_of_walk,
+    per_stride,
+    stride_starts,
+)
 
 _PHASE_ROW, _REQUEST_ROW = "controller_state.phase.phase", "controller_state.request.torque"
 """Paths of the rows for gait phase and requested torque of a controller that has them."""
@@ -132,37 +139,26 @@ def _evaluated(
     starts = stride_starts(record["walk.strides"])
     strides = per_stride(record, starts)
     averages = mean_curves(recording, starts[SETTLING:])
-    metrics: dict[str, Metric] = {}
-    for name, quantity in PER_STRIDE.items():
-        values = strides[name][SETTLING:]
-        if values.size:
-            metrics[name] = Metric(float(values.mean()), quantity.unit, f"{quantity.summary}, mean")
-    metrics["counted_strides"] = Metric(
-        float(strides["gas"][SETTLING:].size), "-", "strides over which the means are taken"
-    )
+    whole = strides["gas"].size
+    averaged = max(whole - SETTLING, 0)
+    values = {name: float(strides[name][SETTLING:].mean()) for name in PER_STRIDE} if averaged else {}
+    values["counted_strides"] = float(averaged)
     healthy = healthy_positive_work(scenario)
     if healthy > 0.0:
-        metrics["healthy_positive_work"] = Metric(healthy, "J", "positive work of the healthy ankle in one stride")
-        if "positive_push_off_work" in metrics:
-            fraction = metrics["positive_push_off_work"].value / healthy
-            summary = "positive work of T_ex in push-off over the healthy ankle's positive work"
-            metrics["push_off_share"] = Metric(fraction, "-", summary)
+        values["healthy_positive_work"] = healthy
+    if healthy > 0.0 and averaged:
+        values["push_off_share"] = values["positive_push_off_work"] / healthy
     if "dorsiflexor_moment" in averages:
         # Phase 1 is phase 0 of the next stride, and counts once.
-        moment = float(averages["dorsiflexor_moment"].mean[:-1].mean())
-        summary = "moment of the wearer's dorsiflexors, mean over the stride"
-        metrics["dorsiflexor_moment"] = Metric(moment, "N m", summary)
+        values["dorsiflexor_moment"] = float(averages["dorsiflexor_moment"].mean[:-1].mean())
     if "toe_height" in averages:
-        metrics["lowest_toes"] = lowest_toes(scenario, averages["toe_height"].mean)
+        values["lowest_toes"] = lowest_toes(scenario, averages["toe_height"].mean)
     if "angle" in averages:
         # Of the mean curves: what differs from stride to stride is in their deviation.
         away = averages["angle"].mean - averages["healthy_angle"].mean
-        summary = "RMS difference of the mean ankle angle to the healthy one"
-        metrics["angle_difference"] = Metric(float(np.sqrt(np.mean(away**2))), "rad", summary)
-    gas = float(np.ptp(recording["supplied_mass"][[0, -1]]))
-    metrics["strides"] = Metric(float(strides["gas"].size), "-", "whole strides of the walk")
-    metrics["total_gas"] = Metric(gas, "kg", "gas taken from the supply in the whole walk")
-    of_torque: dict[str, float] = {}
+        values["angle_difference"] = float(np.sqrt(np.mean(away**2)))
+    values["strides"] = float(whole)
+    values["total_gas"] = float(np.ptp(recording["supplied_mass"][[0, -1]]))
     if "reference" in recording:
         reference, requested = recording["reference"], requested_samples(recording)
         error = reference - recording["torque"]
@@ -171,18 +167,16 @@ def _evaluated(
         pushes = recording["controller_phase"][settled] == PUSH_OFF
         parts = {"push_off_error": error[settled][pushes], "torque_error": error[requested]}
         parts["requested_torque"] = reference[requested]
-        of_torque = {name: float(np.sqrt(np.mean(part**2))) for name, part in parts.items() if part.size}
-    of_torque |= {"peak_torque": peak_torque(recording), "command_reversals": command_reversals(recording)}
-    metrics |= {name: Metric(value, METRICS[name].unit, METRICS[name].summary) for name, value in of_torque.items()}
+        values |= {name: float(np.sqrt(np.mean(part**2))) for name, part in parts.items() if part.size}
+    values |= {"peak_torque": peak_torque(recording), "command_reversals": command_reversals(recording)}
     METRICS.load_all()
     others = [kind for name, kind in METRICS.items() if not METRICS.is_own(name) and not lacks(scenario, kind)]
-    metrics |= evaluate(recording, others)
     return WalkResult(
         scenario=scenario,
         recording=recording,
         strides=strides,
         averages=averages,
-        metrics=Metrics(metrics),
+        metrics=Metrics(metrics_of_walk(values) | evaluate(recording, others)),
         status=status,
         starts=starts,
         supply=supply,

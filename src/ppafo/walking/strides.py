@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.metrics import Metric
-from ppafo.metrics.strides import PER_STRIDE
+from ppafo.metrics import METRICS, Metric
+from ppafo.metrics.strides import OF_MEAN_STRIDE, PER_STRIDE
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import Scenario
@@ -57,12 +57,20 @@ def mean_curves(recording: Recording, starts: NDArray[np.intp]) -> dict[str, Cur
     return curves
 
 
-def lowest_toes(configuration: Scenario, height: Floats) -> Metric:
-    """Return the lowest toe height in mid-swing, where toes must clear the ground, from heights [m] at ``PHASES``."""
+def metrics_of_walk(values: Mapping[str, float]) -> dict[str, Metric]:
+    """Return metrics of a walk from their values [SI] by name, with the units and meanings of the catalogue."""
+    metrics = {}
+    for name, value in values.items():
+        unit, summary = OF_MEAN_STRIDE.get(name) or (METRICS[name].unit, METRICS[name].summary)
+        metrics[name] = Metric(value, unit, summary)
+    return metrics
+
+
+def lowest_toes(configuration: Scenario, height: Floats) -> float:
+    """Return the lowest toe height [m] in mid-swing, where toes must clear the ground, from heights at ``PHASES``."""
     timing = gait_timing(walk_of(configuration).gait)
     first, last = np.searchsorted(PHASES, [timing.clearance_from, timing.clearance_to])
-    summary = "lowest toe height above ground in mid-swing of the mean stride; below 0 the toes would drag"
-    return Metric(float(height[first:last].min()), "m", summary)
+    return float(height[first:last].min())
 
 
 def healthy_positive_work(configuration: Scenario) -> float:

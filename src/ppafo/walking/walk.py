@@ -29,7 +29,7 @@ from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import SHORTEST_STRIDES, duration_problems, walk_of, with_duration
 from ppafo.walking.planning import fed_device
 from ppafo.walking.result import WalkResult
-from ppafo.walking.strides import PHASES, healthy_positive_work, healthy_toe_height, lowest_toes
+from ppafo.walking.strides import PHASES, healthy_positive_work, healthy_toe_height, lowest_toes, metrics_of_walk
 
 Progress = Callable[[float, float], None]
 """Progress callback, called with completed and total work."""
@@ -193,21 +193,18 @@ def without_device(configuration: Scenario) -> Scenario:
 def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:
     """Return the metrics of a walk with a healthy ankle, in SI units; work and muscle moment need a moment curve."""
     gait, wearer = walk_of(configuration).gait, walk_of(configuration).wearer
-    metrics = {
-        "toe_clearance": Metric(0.0, "m", "0 by definition: measured from the healthy gait"),
+    values = {
+        # Measured from the healthy gait, whose heel comes first.
+        **dict.fromkeys(("toe_clearance", "angle_difference", "toe_landing"), 0.0),
         "lowest_toes": lowest_toes(configuration, healthy_toe_height(configuration)),
-        "toe_landing": Metric(0.0, "-", "the heel comes first"),
-        "angle_difference": Metric(0.0, "rad", "0 by definition: measured from the healthy gait"),
     }
     if gait.ankle_moment is None:
-        return metrics
-    work = healthy_positive_work(configuration)
-    metrics["positive_push_off_work"] = Metric(work, "J", "positive work of the ankle moment in one stride")
+        return metrics_of_walk(values)
+    values["positive_push_off_work"] = healthy_positive_work(configuration)
     if wearer.keeps_gait >= 0.5:
         # Without a device, muscles lift the foot: the measured moment beyond the moment of passive tissue.
         torque: Any = passive_torque  # plain arithmetic, of arrays too
         tissue = torque(wearer.leg(), gait.ankle_angle.values_at(PHASES))
         moment = np.maximum(tissue - wearer.body_mass * gait.ankle_moment.values_at(PHASES), 0.0)
-        summary = "moment of the wearer's dorsiflexors, mean over the stride"
-        metrics["dorsiflexor_moment"] = Metric(float(moment[:-1].mean()), "N m", summary)
-    return metrics
+        values["dorsiflexor_moment"] = float(moment[:-1].mean())
+    return metrics_of_walk(values)
