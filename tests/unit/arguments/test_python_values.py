@@ -76,12 +76,6 @@ def test_a_document_that_holds_itself_comes_to_an_end() -> None:
     assert taken_document({"x": list(itertools.islice(itertools.repeat(1), 2))}) == {"x": [1, 1]}
 
 
-@pytest.mark.parametrize("version", [True, np.bool_(True), 2, "1"])
-def test_only_1_is_a_version_of_a_layout(version: Any) -> None:
-    with pytest.raises(ScenarioError, match=r"schema_version = .* is not allowed"):
-        ppafo.scenario_from_dict({**document(), "schema_version": version})
-
-
 @pytest.mark.parametrize("number", [math.nan, math.inf, 0, -1.0, "1 s", None, True, np.ma.masked, np.timedelta64(3)])
 def test_a_number_of_a_changed_scenario_is_checked_as_one_of_a_file(number: Any) -> None:
     scenario = ppafo.load_scenario(TASK)

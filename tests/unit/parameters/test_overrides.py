@@ -1,7 +1,5 @@
 """Overrides by dotted path."""
 
-import itertools
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -46,19 +44,6 @@ def test_a_value_that_is_given_twice_is_refused_with_both_overrides(other: str) 
         with pytest.raises(ParameterError, match="set the same value; remove one of them") as caught:
             apply_overrides(COMPLETED, words)
         assert all(f"'{word}'" in str(caught.value) for word in words)
-
-
-def test_an_orifice_in_two_forms_is_refused_with_both_overrides_in_any_order() -> None:
-    words = ["valve.area=1mm^2", "valve.sonic_conductance=1 L/(s bar)", "valve.critical_ratio=0.3"]
-    told = set()
-    for order in itertools.permutations(words):
-        with pytest.raises(ParameterError) as caught:
-            apply_overrides(COMPLETED, order)
-        told.add(str(caught.value))
-    assert told == {
-        "overrides 'valve.area=1mm^2' and 'valve.critical_ratio=0.3': give either valve.area and "
-        "valve.discharge_coefficient or valve.sonic_conductance and valve.critical_ratio, not both"
-    }
 
 
 def test_a_later_layer_replaces_values_and_forms_of_an_earlier_one() -> None:

@@ -100,16 +100,6 @@ def test_a_mark_that_stands_between_no_groups_is_refused(
         read_foreign(written(tmp_path, f"0;1\n10;{cell}\n"), columns)
 
 
-def test_a_name_that_two_columns_have_is_refused_where_it_is_asked_for(tmp_path: Path) -> None:
-    text = "time,p,p,force\n0,1,2,3\n1,1,2,4\n"
-    time, force = {"column": "time", "unit": "s"}, {"column": "force", "unit": "N m"}
-    columns = mapped(header=True, channels={"time": time, "torque": force})
-    assert list(read_foreign(written(tmp_path, text), columns)["torque"]) == [3.0, 4.0]
-    columns = mapped(header=True, channels={"time": time, "torque": {"column": "p", "unit": "N m"}})
-    with pytest.raises(DataError, match=r"channels\.torque\.column = 'p': must be the number of a column"):
-        read_foreign(written(tmp_path, text), columns)
-
-
 def test_direction_and_sweeps_follow_from_the_rate_of_a_channel(tmp_path: Path) -> None:
     time = np.arange(0.0, 4000.0, 10.0)
     position = 40.0 * np.abs(1.0 - (time / 1000.0) % 2.0)

@@ -54,17 +54,6 @@ def test_a_check_leaves_no_trace(tmp_path: Path) -> None:
     assert names(tmp_path) == []
 
 
-def test_a_place_where_the_system_lets_nobody_write_is_found_by_trying(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refused(self: Path, *arguments: object, **options: object) -> None:
-        raise OSError(30, "Read-only file system")
-
-    monkeypatch.setattr(Path, "mkdir", refused)
-    with pytest.raises(DataError, match="task: cannot be written: read-only file system"):
-        check_result_folder(tmp_path / "task")
-
-
 def interrupt_at(monkeypatch: pytest.MonkeyPatch, method: str, call: int) -> None:
     """Raise KeyboardInterrupt at the given call of a method of Path."""
     original = getattr(Path, method)

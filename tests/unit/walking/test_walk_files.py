@@ -56,13 +56,6 @@ def test_a_gait_may_stand_in_the_motion_or_above_and_not_in_both(tmp_path: Path)
         load_scenario(written(tmp_path, gait + text_of(NAME) + MOTION + gait))
 
 
-def test_an_override_means_the_same_under_either_path() -> None:
-    one, other = (load_scenario(NAME, [f"{path}=falisse2019-subject1"]) for path in ("gait", "motion.gait"))
-    assert walk_of(one) == walk_of(other)
-    with pytest.raises(ScenarioError, match=r"overrides 'gait=other' and 'motion\.gait=mine' set the same value"):
-        load_walk(NAME, ["motion.gait=mine"], gait="other")
-
-
 def test_a_gait_beside_a_file_in_another_folder_is_found_by_its_relative_path(tmp_path: Path) -> None:
     gait = (resources.files("ppafo") / "gait" / "normative" / "falisse2019-subject1.toml").read_text(encoding="utf-8")
     (tmp_path / "own.toml").write_text(gait)
