@@ -23,7 +23,7 @@ from ppafo.parameters.device import SonicOrifice
 from ppafo.parameters.graph import PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.parameters.overrides import read_overrides
 from ppafo.parameters.plant import plant_parameters
-from ppafo.parameters.reach import supply_for
+from ppafo.parameters.reach import HIGHEST_PRESSURE, supply_for
 from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.default_gains import SLOPE_GAINS, default_links
 from ppafo.simulation.numbers import declared_numbers, number_at, present_numbers
@@ -78,12 +78,12 @@ _TOGETHER = {
 """Number that is made ideal with another one."""
 _ISOTHERMAL = 1.0e4
 """Heat transfer coefficient [W/(m^2 K)] with which gas keeps the temperature of its walls."""
-_VALVES, _SMALL_VALVES = (1.5, 2.0, 4.0, 10.0, 30.0, 100.0, 1.0e3, 1.0e4), (0.3, 0.1, 0.03, 0.01)
+_VALVES, _SMALL_VALVES = (1.5, 2.0, 4.0, 10.0, 30.0, 100.0, 300.0, 1.0e3, 3.0e3, 1.0e4), (0.3, 0.1, 0.03, 0.01)
 """Sizes of a valve divided by the present one [-]."""
 _FILLED = 5.0e-3
 """Time in which a larger valve fills the chambers at least [s]: a larger one needs shorter steps and helps no more."""
-_SUPPLIES, _TOP_SUPPLY, _LEAST_PRESSURE = (1.15, 1.4, 1.8, 2.5, 4.0), 1.1e6, 1.0e3
-"""Gauge pressures of supplies divided by the present ones [-], highest supply and lowest pressure [Pa absolute]."""
+_SUPPLIES, _LEAST_PRESSURE = (1.15, 1.4, 1.8, 2.5, 4.0), 1.0e3
+"""Gauge pressures of supplies divided by the present ones [-], and lowest pressure [Pa absolute]."""
 _RATES, _TOP_RATE = (4.0, 10.0, 30.0, 100.0), 2.0e3
 """Rates of a controller divided by the present one [-], and the highest one [Hz]."""
 _VOLUMES = (0.25, 4.0)
@@ -244,7 +244,7 @@ def _better_device(scenario: Scenario, present: Mapping[str, float]) -> Iterator
     for paths in (supplies[:1], supplies[1:], supplies):
         for by in _SUPPLIES if paths else ():
             pressures = {path: room + by * (present[path] - room) for path in paths}
-            if min(pressures.values()) > _LEAST_PRESSURE and max(pressures.values()) < _TOP_SUPPLY:
+            if min(pressures.values()) > _LEAST_PRESSURE and max(pressures.values()) < room + HIGHEST_PRESSURE:
                 yield Change(HIGHER_SUPPLY, "device", pressures, scenario)
     lowest = "valve.lowest_pressure"
     if present.get(lowest, room) > room:

@@ -225,7 +225,7 @@ LOCKED_LEVER = ["controller.kind=pid", "reference.of=torque", *WAVE]
 
 
 @pytest.mark.parametrize("frequency", [0.5, 4.0])
-def test_a_wave_cut_by_both_supplies_is_no_oscillation_and_is_given_both_pressures(frequency: float) -> None:
+def test_a_wave_cut_by_both_supplies_is_no_oscillation_and_is_given_the_larger_pressure(frequency: float) -> None:
     changes = [*LOCKED_LEVER, "reference.amplitude=10 N m", f"reference.frequency={frequency} Hz"]
     scenario = load_scenario("cylinder-servo", changes)
     verdict = verdict_of(simulate(scenario))
@@ -235,10 +235,9 @@ def test_a_wave_cut_by_both_supplies_is_no_oscillation_and_is_given_both_pressur
     lowest, highest = torque_reach(scenario.device, math.pi / 2.0)
     needed = [10.0 / reach * gauge / 1.0e5 for reach in (highest, -lowest)]
     given = {path: value for path, _, value in (text.partition("=") for text in verdict.mended)}
-    assert list(given) == ["supply.pressure", "supply.dorsiflexion_pressure"]
-    # 5 % of the amplitude may be missing.
-    pressures = [float(value.removesuffix(" bar_g")) for value in given.values()]
-    assert all(pressure > 0.95 * least for pressure, least in zip(pressures, needed, strict=True))
+    # The second regulator follows the first, and 5 % of the amplitude may be missing.
+    assert list(given) == ["supply.pressure"]
+    assert float(given["supply.pressure"].removesuffix(" bar_g")) > 0.95 * max(needed)
 
 
 def test_a_judged_part_without_a_peak_gives_no_verdict() -> None:
