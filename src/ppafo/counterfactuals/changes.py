@@ -17,6 +17,7 @@ from ppafo.control.kind import PythonController
 from ppafo.errors import PpafoError
 from ppafo.loading import reloaded
 from ppafo.model.controlled import ANGLE
+from ppafo.model.declaration import Quantity
 from ppafo.model.plant import gravity_torque
 from ppafo.model.valves.kind import VENT
 from ppafo.parameters.device import SonicOrifice
@@ -110,7 +111,7 @@ _GAINS = (
 """Gains that are drawn together; the others follow them or are numbers of the device."""
 _SAME = 0.02
 """Relative difference up to which two settings count as the same [-]."""
-_COMMANDS = (-1.0, 64.0, 8.0, 0.125)
+_COMMANDS = (-1.0, 64.0, 16.0, 4.0, 1.0 / 16.0)
 """Factors on the command of a Python object, whose gains nobody knows; the first one finds a wrong sign [-]."""
 _FLAWS_OF_OBJECT, _LONGEST_OF_OBJECT = 3, 4.0
 """Number of flaws that are made ideal with a Python object, and its longest run divided by the present one [-]."""
@@ -176,13 +177,14 @@ def changes_of(scenario: Scenario) -> list[Change]:
         return [*_settings(scenario), *_other_kinds(scenario), *of_device, *of_task]
     bases = [(factor, scenario.controlled_by(ScaledCommand(custom, factor))) for factor in _COMMANDS]
     commands = [Change(_scaled(factor), "law", {}, base, is_of_command=True) for factor, base in bases]
-    # Its runs are slow: of each property the largest step that does not take many times as long.
-    longest = _LONGEST_OF_OBJECT * present[_DURATION]
-    largest = {
-        change.words: change for change in (*of_device, *of_task) if change.numbers.get(_DURATION, 0.0) <= longest
-    }
-    sizes = [largest[words] for words in (HIGHER_SUPPLY, LARGER_VALVE, SLOWER_REFERENCE) if words in largest]
-    flaws = [each for words, each in largest.items() if "`" in words and each.group in ("sensors", "device")]
+    # Its runs are slow: of each property a step in the middle that does not take many times as long.
+    longest, steps = _LONGEST_OF_OBJECT * present[_DURATION], dict[str, list[Change]]()
+    for change in (*of_device, *of_task):
+        if change.numbers.get(_DURATION, 0.0) <= longest:
+            steps.setdefault(change.words, []).append(change)
+    middle = {words: each[len(each) // 2] for words, each in steps.items()}
+    sizes = [middle[words] for words in (HIGHER_SUPPLY, LARGER_VALVE, SLOWER_REFERENCE) if words in middle]
+    flaws = [each for words, each in middle.items() if "`" in words and each.group in ("sensors", "device")]
     flaws.sort(key=lambda each: each.group != "sensors")
     return [*commands, *flaws[:_FLAWS_OF_OBJECT], *sizes]
 
@@ -193,26 +195,29 @@ def _scaled(factor: float) -> str:
 
 def _ideals(scenario: Scenario, present: Mapping[str, float]) -> Iterator[Change]:
     """Yield a change for each number that a device, a sensor or a load would rather not have."""
-    declared, second = declared_numbers(scenario), set(_TOGETHER.values())
+    declared, second, of_sensors = declared_numbers(scenario), set(_TOGETHER.values()), dict[str, list[Change]]()
+    is_locked = scenario.motion.locked_angle is not None
     for path, number in present.items():
         section, item = path.partition(".")[0], declared[path]
         is_flaw = section in ("valve", "sensors", "effects", "friction") and item.default == 0.0
-        is_of_motion = section == "friction" and scenario.motion.locked_angle is not None
-        if number == 0.0 or path in second or not (is_flaw or path in _FLAWS) or item.whole or ".opening." in path:
+        is_other = path in second or item.whole or ".opening." in path or (is_locked and section == "friction")
+        if number == 0.0 or is_other or not (is_flaw or path in _FLAWS):
             continue
-        if is_of_motion:
-            continue
-        quickest = next((most for end, most in _QUICKEST.items() if path.endswith(end)), 0.0)
-        paths = [each for each in (path, _TOGETHER.get(path, "")) if present.get(each)]
-        numbers = {each: present[each] * _IDEAL for each in paths}
-        if path.endswith(QUICKER_ABOVE):
-            numbers = {path: max(quickest, 10.0 * number)}
-        elif section == "valve" and item.unit == "s" and path != "valve.delay":
-            numbers = {each: min(_SHORTEST, present[each]) for each in paths}
-        elif path == "effects.line_resistance.area":
-            numbers = {path: item.maximum}
+        numbers = {
+            each: _ideal(each, present[each], item) for each in (path, _TOGETHER.get(path, "")) if present.get(each)
+        }
         group = _FLAWS.get(path, "sensors" if section == "sensors" else "load" if "joint_load" in path else "device")
-        yield Change(ideal_words(scenario, path), group, numbers, scenario)
+        change = Change(ideal_words(scenario, path), group, numbers, scenario)
+        yield change
+        if section == "sensors":
+            of_sensors.setdefault(path.rpartition("_")[2], []).append(change)
+    for several in of_sensors.values():
+        # Noise of two sensors, or their resolutions, may each be too much.
+        if len(several) > 1:
+            words = " and ".join((several[0].words, *(change.words.removeprefix("without ") for change in several[1:])))
+            yield Change(
+                words, "sensors", {path: n for change in several for path, n in change.numbers.items()}, scenario
+            )
     nodes = [path for path in present if path.startswith("effects.opening.command_") and present[path] > 0.0]
     if nodes:
         straight = {path.replace("command", "opening"): present[path] for path in nodes}
@@ -220,6 +225,16 @@ def _ideals(scenario: Scenario, present: Mapping[str, float]) -> Iterator[Change
     if present.get("gas_model.wall_area_per_volume", 0.0) > 0.0:
         isothermal = {"gas_model.heat_transfer_coefficient": _ISOTHERMAL}
         yield Change("with gas of constant temperature", "device", isothermal, scenario)
+
+
+def _ideal(path: str, number: float, item: Quantity) -> float:
+    """Ideal number [SI] in place of one: quicker, or so much less that it does nothing."""
+    if path.endswith(QUICKER_ABOVE):
+        return max(10.0 * number, next((most for end, most in _QUICKEST.items() if path.endswith(end)), 0.0))
+    if path == "effects.line_resistance.area":
+        return item.maximum
+    is_short = path.startswith("valve.") and item.unit == "s" and path != "valve.delay"
+    return min(_SHORTEST, number) if is_short else _IDEAL * number
 
 
 def _better_device(scenario: Scenario, present: Mapping[str, float]) -> Iterator[Change]:
