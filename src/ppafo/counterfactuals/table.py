@@ -32,7 +32,7 @@ def excesses(changes: Sequence[Change]) -> list[float]:
     Changes of one scenario are one ensemble, so that most share a program. A Python object runs once after the other,
     until its time is over.
     """
-    found = [math.inf] * len(changes)
+    left = [math.inf] * len(changes)
     groups: dict[int, list[int]] = {}
     for place, change in enumerate(changes):
         is_slow = change.base.controller.custom is not None
@@ -42,8 +42,8 @@ def excesses(changes: Sequence[Change]) -> list[float]:
         base = changes[places[0]].base
         if base.controller.custom is None or time.process_time() < started + _TIME_OF_OBJECT:
             for place, excess in zip(places, _judged(base, [changes[each].numbers for each in places]), strict=True):
-                found[place] = excess
-    return found
+                left[place] = excess
+    return left
 
 
 def _judged(base: Scenario, rows: Sequence[Mapping[str, float]]) -> list[float]:

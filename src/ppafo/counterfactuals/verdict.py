@@ -29,6 +29,7 @@ from ppafo.simulation.numbers import present_numbers, with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
 from ppafo.simulation.tracking.case import overrides_of
+from ppafo.simulation.tracking.evidence import SMALLER_REFERENCE
 from ppafo.units.shown import in_units
 from ppafo.wording import override_text
 
@@ -53,8 +54,8 @@ _CAUSES, _REMEDIES = 3, 5
 """Largest number of causes in a sentence, and of changes of which a smaller step is tried."""
 _EFFORT = {"law": 0, "start": 1, "device": 2, "sensors": 3, "load": 4, "task": 5}
 """Order of remedies by what is changed with least effort."""
-_DEPTH = {"device": 0.0, "sensors": 0.0, "load": 0.0, "start": 0.0, "law": 1.0, "task": 3.0}
-"""Order of causes: what is not ideal before what is chosen."""
+_DEPTH, _LAST = {"device": 0.0, "sensors": 0.0, "load": 0.0, "start": 0.0, "law": 1.0, "task": 2.0}, 3.0
+"""Order of causes: what is not ideal before what is chosen, and what the task asks for at last."""
 _CHOSEN = 2.0
 """Factor on what a better choice leaves, by which it comes after a property made ideal [-]."""
 _NEARER = 0.5
@@ -73,7 +74,15 @@ def verdict_of(result: "Result | WalkResult") -> "Tracking":
     verdict = result.tracking
     if not verdict.is_useless:
         return verdict
-    scenario = result.scenario
+    try:
+        return _with_causes(verdict, result.scenario)
+    except PpafoError:
+        # A walk on its bottle, for one, is no row of an ensemble.
+        return verdict
+
+
+def _with_causes(verdict: "Tracking", scenario: Scenario) -> "Tracking":
+    """Return the verdict on a run that does not follow with causes and a remedy."""
     rated = _table(_first_strides(scenario))
     (_, excess), best = rated[0], _best_of_words(rated[1:])
     follow = [each for each in best if each[1] <= 1.0]
@@ -88,10 +97,10 @@ def verdict_of(result: "Result | WalkResult") -> "Tracking":
         changes = _pairs_that_follow(best)
     if not changes:
         nearest, left = min(best, key=lambda each: each[1], default=rated[0])
-        said = f"none of {len(rated)} changes suffices, nor does a pair of the best"
+        text = f"none of {len(rated)} changes suffices, nor does a pair of the best"
         if left < _NEARER * excess:
-            said += f"; {nearest.words} its error is {left:.3g} times the allowed one, in place of {excess:.3g}"
-        return replace(verdict, tried=said)
+            text += f"; {nearest.words} its error is {left:.3g} times the allowed one, in place of {excess:.3g}"
+        return replace(verdict, tried=text)
     words = [change.words for change in changes[:_CAUSES]]
     clauses = [text for confirming, text in verdict.evidence if not set(confirming).isdisjoint(words)]
     tried, mended = _remedy(scenario, changes)
@@ -141,11 +150,12 @@ def _order(lowest: Mapping[str, float], evident: Collection[str], change: Change
 
     ``evident`` are the words of changes for which the run has evidence; without it, a load is part of the task.
     """
-    left, has_evidence = lowest[change.words], change.words in evident
+    left = lowest[change.words] * (1.0 if is_ideal(change) else _CHOSEN)
     if is_of_given(change):
         return -1.0, left
-    depth = 2.0 if change.group == "load" and not has_evidence else _DEPTH[change.group]
-    return depth, left * (1.0 if is_ideal(change) or has_evidence else _CHOSEN)
+    # Everything follows a reference that is small enough, and stays without a load.
+    is_of_task = change.words == SMALLER_REFERENCE or (change.group == "load" and change.words not in evident)
+    return _LAST if is_of_task else _DEPTH[change.group], left
 
 
 def _pairs_that_follow(best: Sequence[Rated]) -> list[Change]:

@@ -237,9 +237,9 @@ def _flung_at_start(case: Case) -> str:
     deviation = float(np.max((reference - angle) * np.sign(lacking)))
     if abs(lacking) <= float(device.friction.static_torque) or deviation <= _FLUNG * case.settled.wanted_change:
         return ""
-    given, needed = level_text("N m", load - lacking), level_text("N m", load)
+    carried, needed = level_text("N m", load - lacking), level_text("N m", load)
     away = f"the joint moves away by {change_text(ANGLE, deviation)} before the chambers are filled"
-    return f"at the start the chambers give {given} for a load of {needed}: {away}"
+    return f"at the start the chambers give {carried} for a load of {needed}: {away}"
 
 
 def _step_of_valves(case: Case) -> str:
@@ -258,8 +258,8 @@ def _step_of_valves(case: Case) -> str:
     declare = switching_remedy(scenario.controller.kind)
     asks = f"`{law.name}` requests partial openings, which on/off valves do not have{declare}: "
     in_time = f"in their dead time of {1.0e3 * dead_time:.3g} ms, {ratio:.2g} times the requested change"
-    said = asks * (is_pair(scenario) and not law.only_switches)
-    return f"{said}the valves cause a step of {change_text(controlled, step)} {in_time}"
+    partial = asks * (is_pair(scenario) and not law.only_switches)
+    return f"{partial}the valves cause a step of {change_text(controlled, step)} {in_time}"
 
 
 def _pair_step(case: Case, law: ControllerKind) -> tuple[float, float]:
