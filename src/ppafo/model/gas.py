@@ -4,7 +4,6 @@ The energy of a chamber changes by the enthalpy of the inflow and outflow, the w
 through the wall: ``dE/dt = sum of m_dot h_up - P dV/dt + h A (T_wall - T)``.
 """
 
-import math
 from dataclasses import dataclass
 
 from ppafo.constants import MOLAR_MASSES
@@ -87,8 +86,3 @@ def energy_per_content(gas_product: float, heat_capacity_ratio: float) -> float:
     The gas content of a chamber is the mass of gas at the reference temperature that has the pressure of the chamber.
     """
     return gas_product / (heat_capacity_ratio - 1.0)
-
-
-def temperature_flow_factor(reference_temperature: float, upstream_temperature: float) -> float:
-    """Correction factor [-] of a conductance given at a reference temperature [K]: sqrt(T_ref/T_up), equation (6)."""
-    return math.sqrt(reference_temperature / upstream_temperature)

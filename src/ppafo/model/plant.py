@@ -121,6 +121,11 @@ def actuator_torque(pressure_1: Numeric, pressure_2: Numeric, torque_constant: f
     return torque_constant * (pressure_1 - pressure_2)
 
 
+def pressure_for_torque(torque: float, torque_constant: float) -> float:
+    """Pressure difference [Pa] of an actuator torque [N m]; the inverse of equation (2)."""
+    return torque / actuator_torque(1.0, 0.0, torque_constant)
+
+
 def joint_torque(plant: PlantParameters, _angle: float, pressure_1: float, pressure_2: float) -> float:
     """Torque of the actuator [N m] at an angle [rad] and two absolute pressures [Pa]. Equation (2).
 

@@ -15,8 +15,7 @@ enthalpy along: ``dU/dt = -m_dot h + heat from the wall``. The regulator has no 
 from bisect import bisect_right
 from typing import NamedTuple
 
-from ppafo.model.gas import choked_flow_constant
-from ppafo.model.orifice import isentropic_flow_function
+from ppafo.model.orifice import area_conductance, isentropic_flow_function
 
 Column = tuple[float, ...]
 Nodes = tuple[int, float]
@@ -278,5 +277,6 @@ def regulator_flow_limit(
     """Largest flow [kg/s] of a regulator at its set pressure, with its seat fully open. Equations (6), (7)."""
     # A set pressure above the bottle's gives no flow, not an error: the bottle is nearly empty then.
     ratio = min(regulator.set_pressure / bottle_pressure, 1.0)
-    choked = choked_flow_constant(heat_capacity_ratio, gas_constant, temperature)
-    return regulator.seat_area * choked * bottle_pressure * isentropic_flow_function(ratio, heat_capacity_ratio)
+    # The area of the seat has its discharge coefficient in it.
+    conductance = area_conductance(regulator.seat_area, 1.0, heat_capacity_ratio, gas_constant, temperature)
+    return conductance * bottle_pressure * isentropic_flow_function(ratio, heat_capacity_ratio)

@@ -5,6 +5,7 @@ not. Readings of steady states are formulas. ``record`` returns the recording wi
 recordings has a CSV file for each experiment, and ``rig.json``.
 """
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +17,7 @@ from ppafo.constants import PASCALS_PER_PSI
 from ppafo.documents.json_text import fields_of, json_text, plain
 from ppafo.errors import DataError, ParameterError, SimulationError
 from ppafo.model.catalog import VALVES
-from ppafo.model.gas import temperature_flow_factor
+from ppafo.model.gas import mass_flow_ratio
 from ppafo.model.orifice import orifice_flow
 from ppafo.model.plant import actuator_torque
 from ppafo.model.sensors import follow, quantise
@@ -187,7 +188,7 @@ def _valve_flow(device: Device, preset: Preset, upstream: float, downstream: flo
     plant = plant_parameters(device)
     flow, _, _ = orifice_flow(upstream, downstream, opening * plant.valve_conductance, 1.0, plant.valve_curve)
     warmer = device.gas.temperature + preset.values["bench.gas_difference"]
-    return flow * temperature_flow_factor(device.gas.temperature, warmer)
+    return flow * mass_flow_ratio(math.sqrt(warmer / device.gas.temperature))
 
 
 @dataclass(frozen=True, slots=True)

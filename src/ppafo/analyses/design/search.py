@@ -24,6 +24,7 @@ from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.torque_loop import proportional_gain
 from ppafo.documents.json_text import fields_of
 from ppafo.errors import ParameterError, StudyError
+from ppafo.model.plant import pressure_for_torque
 from ppafo.parameters.bottles.bottle import Bottle
 from ppafo.progress import Progress, Report
 from ppafo.report.finding import Finding, Section, columns_of
@@ -485,7 +486,8 @@ def ceiling_pressure(problem: SizingProblem) -> float:
     # A limit that is kept without any torque has no root: brentq needs a change of sign.
     if cut_error(problem, atmosphere) <= problem.largest_error:
         return for_peak
-    uncut = atmosphere + problem.profile.largest / problem.scenario.device.actuator.torque_constant
+    constant = problem.scenario.device.actuator.torque_constant
+    uncut = atmosphere + pressure_for_torque(problem.profile.largest, constant)
     root = float(brentq(lambda pressure: cut_error(problem, pressure) - problem.largest_error, atmosphere, uncut))
     return max(root, for_peak)
 
@@ -493,7 +495,7 @@ def ceiling_pressure(problem: SizingProblem) -> float:
 def peak_pressure(problem: SizingProblem) -> float:
     """Return the pressure [Pa absolute] for the required share of the peak torque; equation (2)."""
     torque_constant = problem.scenario.device.actuator.torque_constant
-    return problem.atmosphere + LEAST_PEAK * problem.profile.largest / torque_constant
+    return problem.atmosphere + pressure_for_torque(LEAST_PEAK * problem.profile.largest, torque_constant)
 
 
 def cut_error(problem: SizingProblem, pressure: float) -> float:

@@ -28,6 +28,7 @@ from ppafo.identification.estimate import shown_text
 from ppafo.identification.fit import Fit, FitNumber, tolerance
 from ppafo.identification.source import RecordingSource, Sources
 from ppafo.model.declaration import Number
+from ppafo.model.plant import chamber_1_volume, chamber_2_volume
 from ppafo.parameters.device import VANE
 from ppafo.parameters.records import keyed
 from ppafo.report.kind import TIME, Kind
@@ -337,12 +338,13 @@ class VaneLeakProblem(LeakLaw, bench.TimedLaw):
                 raise IdentificationError(
                     f"{context.label}: angle = {angle:.4g} rad lies beyond the stops, {lower:.4g} to {upper:.4g} rad"
                 )
+            at_angle = chamber_1_volume(angle, lower, per_angle, dead_1)
             # A volume that is given counts before one from the angle: its line may be another one.
-            first = first or dead_1 + per_angle * (angle - lower)
-            second = second or dead_2 + per_angle * (upper - angle)
+            first = first or at_angle
+            second = second or chamber_2_volume(angle, upper, per_angle, dead_2)
             of_volume = context.deviation("actuator.dead_volume_1", dead_1)
             of_angle = (angle - lower) * context.deviation("actuator.displacement_per_radian", per_angle)
-            deviation = math.hypot(of_volume, of_angle) / (dead_1 + per_angle * (angle - lower))
+            deviation = math.hypot(of_volume, of_angle) / at_angle
         return first, second, deviation
 
     def leak(self, sources: Sources, context: bench.BenchContext, openings: Sequence[Opening]) -> _Fitted:

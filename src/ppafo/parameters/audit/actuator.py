@@ -7,8 +7,8 @@ from pathlib import Path
 
 from ppafo.errors import ParameterError, UnitError
 from ppafo.model.actuators.cylinder import pins_at
-from ppafo.model.gas import choked_flow_constant
-from ppafo.model.orifice import isentropic_flow_function
+from ppafo.model.orifice import area_conductance, isentropic_flow_function
+from ppafo.model.plant import pressure_for_torque
 from ppafo.parameters.audit.evidence import AuditFinding, Evidence, ReportedRange, Severity, of_each_valve
 from ppafo.parameters.building import build_device
 from ppafo.parameters.device import VANE
@@ -378,8 +378,8 @@ def while_walking(evidence: Evidence, valve: str) -> Iterator[AuditFinding]:
     gas, volume, atmosphere = evidence.gas(), evidence.chamber_1_volume(_TOE_OFF), evidence.atmosphere()
     area, coefficient, supply, torque, constant = evidence.positive(*paths, "reported.walking_torque", _TORQUE_CONSTANT)
     k, product = gas.heat_capacity_ratio, gas.specific_gas_constant * gas.temperature
-    choked = area * coefficient * choked_flow_constant(k, gas.specific_gas_constant, gas.temperature) * supply
-    target = atmosphere + _REACHED * min(torque / constant, supply - atmosphere)
+    choked = area_conductance(area, coefficient, k, gas.specific_gas_constant, gas.temperature) * supply
+    target = atmosphere + _REACHED * min(pressure_for_torque(torque, constant), supply - atmosphere)
     interval = (target - atmosphere) / _INTERVALS
     middles = (atmosphere + (number + 0.5) * interval for number in range(_INTERVALS))
     slowings = (1.0 / isentropic_flow_function(middle / supply, k) for middle in middles)

@@ -21,6 +21,7 @@ from ppafo.engine.rows import leaf_paths, leaves, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.model.cold_gas import DRY_ICE, SupplyNow, SupplyState, advance_supply, open_share
 from ppafo.model.effects.kind import Effect
+from ppafo.model.gas import mass_flow_ratio
 from ppafo.model.regulator import line_pressures
 from ppafo.model.source import bottle_content, has_liquid
 from ppafo.parameters.device import Device
@@ -320,8 +321,7 @@ class _Lanes:
         pressure and largest flow of the regulator follow, then the parameters of the effects at the temperature T.
         """
         plant, warmth = self.run.plant, now.gas_temperature / self.start
-        # Mass flow at given pressures goes with one over the root of the temperature of the gas.
-        slower = 1.0 / math.sqrt(warmth)
+        slower = mass_flow_ratio(math.sqrt(warmth))
         product, valve, leak = plant.gas_product, plant.valve_conductance, plant.leak_conductance
         own = [product * warmth, valve * slower, leak * slower, now.set_pressure, now.largest_flow]
         device = replace(self.device, gas=replace(self.device.gas, temperature=now.gas_temperature))
