@@ -12,14 +12,12 @@ from ppafo.report.kind import TIME, ConfidenceInterval, Kind, label_of, of_metri
 from ppafo.report.panels import Mark, Panel, dots
 from ppafo.report.style import BLACK, BLUE, COLOURS, GREEN, GREY, MARKERS, ORANGE, PURPLE, VERMILION, look_of_valve
 from ppafo.running import simulate
-from ppafo.simulation.declaration import changes_reach
 from ppafo.simulation.ensemble import lacking
 from ppafo.simulation.gains import gains_of, remark_on_following_gains
 from ppafo.simulation.numbers import NOISE_SEED, changes_in
 from ppafo.simulation.simulate import Result, Status, simulate_many
 from ppafo.simulation.tracking import Tracking
-from ppafo.simulation.tracking.case import change_text
-from ppafo.simulation.tracking.rule import CRITERION_TEXTS, shortfall
+from ppafo.simulation.tracking.rule import ON_PURPOSE
 from ppafo.simulation.tracking.verdict import standing_still
 from ppafo.studies.distributions import Distribution, Floats
 from ppafo.studies.draws import (
@@ -44,6 +42,14 @@ from ppafo.studies.study import DEFAULT_SEED, Configuration, configurations_with
 from ppafo.studies.varying import VariedPath, distribution_in, value_at, varied_path
 from ppafo.study.blocks import unvaried
 from ppafo.study.executing import executor_of
-from ppafo.study.runs import FAILED, Rows, RunCounter, Runs, scenario_runs
+from ppafo.study.runs import (
+    FAILED,
+    Rows,
+    RunCounter,
+    Runs,
+    TrackingCounts,
+    scenario_runs,
+    tracking_counts,
+)
 from ppafo.units import split_quantity
 from ppafo.wording import override_text

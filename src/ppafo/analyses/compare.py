@@ -76,10 +76,11 @@ class ComparedCase:
     """Result of a configuration on a task: nominal run, and runs over the draws.
 
     - ``verdict``: end of the nominal run in a word; ``tracking``: how it follows, with a tried remedy
-    - ``follows``: True if the nominal run completes and follows its reference, or misses it only as announced
+    - ``follows``: True if the nominal run completes and follows its reference
+    - ``is_ranked``: True if it does, is not judged, or misses the reference because it is beyond reach on purpose
     - ``failed``: number of draws whose run failed
-    - ``following``: number of draws whose run does so too; None without a verdict on any
-    - ``is_on_front``: True if the case follows and no other that follows beats it in both error and gas
+    - ``draws``: draws that follow, do not, or are beyond reach on purpose; None without a verdict on any
+    - ``is_on_front``: True if the case is ranked and no other one beats it in both error and gas
     - ``pairs``: statistics against the baseline by metric, ``best``: probability of being the best; empty without draws
     - ``rows``: runs over the draws, by column; empty without
     """
@@ -88,10 +89,11 @@ class ComparedCase:
     status: ask.Status
     verdict: str
     follows: bool
+    is_ranked: bool
     tracking: ask.Tracking
     metrics: Mapping[str, ask.Metric]
     failed: int
-    following: int | None
+    draws: ask.TrackingCounts | None
     is_on_front: bool
     pairs: dict[str, PairedMetric]
     best: dict[str, ask.ConfidenceInterval]
@@ -350,25 +352,27 @@ def _cases(found: ComparisonResult, runs: Mapping[str, tuple[ask.Result, ask.Row
         with said_of_configuration(name):
             tracking = ask.verdict_of(nominal)
         is_completed, pairs = nominal.status.is_completed, dict[str, PairedMetric]()
-        follows, word = is_completed and not tracking.is_useless, str(nominal.status.kind)
+        word = str(nominal.status.kind)
         if tracking.fails and is_completed:
-            word = "beyond reach" if follows else tracking.kind
+            word = "beyond reach on purpose" if tracking.accepted else tracking.kind
         if base is not None and rows is not None and name != found.baseline:
             # Without a pair of values a metric has no statistics.
             for metric, better in found.metrics.items():
                 if pair := compare_pairs(base[metric], rows[metric], better, found.confidence, draws):
                     pairs[metric] = pair
         first = {} if rows is None else {metric: values[:draws] for metric, values in rows.items()}
-        passes = first.get("passes", np.zeros(0))
+        failed = int(np.count_nonzero(first.get(ask.FAILED, 0)))
+        counts = ask.tracking_counts(first, draws - failed) if first else None
         case = ComparedCase(
             configuration=name,
             status=nominal.status,
             verdict=word,
-            follows=follows,
+            follows=is_completed and bool(tracking.follows),
+            is_ranked=is_completed and not tracking.is_useless,
             tracking=tracking,
             metrics={metric: value for metric, value in nominal.metrics.items() if metric in found.metrics},
-            failed=int(np.count_nonzero(first.get(ask.FAILED, 0))),
-            following=int(np.count_nonzero(passes == 1.0)) if np.isfinite(passes).any() else None,
+            failed=failed,
+            draws=counts if counts is not None and counts.without_verdict < draws - failed else None,
             is_on_front=False,
             pairs=pairs,
             best={},
@@ -377,14 +381,14 @@ def _cases(found: ComparisonResult, runs: Mapping[str, tuple[ask.Result, ask.Row
         )
         cases.append(case)
     # A case that does not follow its reference is not among the best.
-    following = [case for case in cases if case.follows]
-    points = np.array([[case.value(name) for name in (found.error, _GAS)] for case in following]).reshape(-1, 2)
-    front = dict(zip([case.configuration for case in following], pareto_front(points).tolist(), strict=True))
+    ranked = [case for case in cases if case.is_ranked]
+    points = np.array([[case.value(name) for name in (found.error, _GAS)] for case in ranked]).reshape(-1, 2)
+    front = dict(zip([case.configuration for case in ranked], pareto_front(points).tolist(), strict=True))
     for metric, better in found.metrics.items() if draws else ():
         # All at once: no pair says which of three is the best. Empty where no draw has a value of all.
-        values = [case.rows[metric] for case in following]
+        values = [case.rows[metric] for case in ranked]
         shares = best_probabilities(values, better, found.confidence) if better and values else []
-        for case, share in zip(following, shares, strict=False):
+        for case, share in zip(ranked, shares, strict=False):
             case.best[metric] = share
     return [replace(case, is_on_front=front.get(case.configuration, False)) for case in cases]
 
@@ -462,7 +466,7 @@ def _remarks(found: ComparisonResult) -> list[str]:
                 remarks.append(ask.remark_on_following_gains(case.scenario, found.varied))
                 if kept := case.scenario.origin.replaced:
                     remarks.append(f"{where}: {kept}")
-                if not case.follows:
+                if not case.is_ranked:
                     remarks.append(f"{where}: {case.tracking.sentence}; not counted among the best")
             if not case.status.is_completed:
                 failed.append(f"{where}: {case.status.message}")
@@ -529,7 +533,7 @@ def _finding(found: ComparisonResult, check: bool, overrides: Sequence[str]) -> 
             ask.Section("How to read it", said=[_READING], is_detail=True) if found.draws else ask.Section(),
         ),
         found=found,
-        passed=all(case.status.is_completed and (case.follows or not check) for case in cases),
+        passed=all(case.status.is_completed and (case.is_ranked or not check) for case in cases),
         overrides=overrides,
     )
 
@@ -540,21 +544,20 @@ def _tables(found: ComparisonResult, task: str) -> list[ask.Section]:
     # A column without any number, such as the error of a hold that no task has, says nothing.
     held = (name for name in found.metrics if not all(math.isnan(case.value(name)) for case in cases))
     kinds = {name: ask.of_metric(name) for name in held}
-    following, best = [case for case in cases if case.follows], list[str]()
+    ranked, best = [case for case in cases if case.is_ranked], list[str]()
     for metric in (name for name in kinds if name in (found.error, _GAS)):
         shares = [
             f"{case.configuration} {ask.Kind(form='.4g').interval(case.best[metric])}"
-            for case in following
+            for case in ranked
             if metric in case.best
         ]
-        values = [case.value(metric) for case in following]
+        values = [case.value(metric) for case in ranked]
         if shares and len(cases) > 2:
             best.append(f"best: {metric}: {', '.join(shares)}")
         elif not found.draws and len(values) > 1 and all(map(math.isfinite, values)):
             least = min(values)
-            named = ", ".join(case.configuration for case in following if case.value(metric) == least)
+            named = ", ".join(case.configuration for case in ranked if case.value(metric) == least)
             best.append(f"best: {metric}: {named} ({kinds[metric].text(least)})")
-    follow = ["-" if case.following is None else f"{case.following:,} of {found.draws:,}" for case in cases]
     gains = ((case, ask.gains_of(case.scenario)) for case in cases)
     return [
         ask.Section(
@@ -563,9 +566,11 @@ def _tables(found: ComparisonResult, task: str) -> list[ask.Section]:
                 ask.Column("configuration", [case.configuration for case in cases]),
                 *(ask.Column(kind.words, [case.value(name) for case in cases], kind) for name, kind in kinds.items()),
                 ask.Column("status", [case.verdict for case in cases]),
-                *([ask.Column("draws that follow", follow)] if found.draws else []),
             ],
-            remarks=[f"{case.configuration}: {used.sentence}" for case, used in gains if used is not None],
+            remarks=[
+                *(f"{case.configuration}: {case.draws.sentence}" for case in cases if case.draws is not None),
+                *(f"{case.configuration}: {used.sentence}" for case, used in gains if used is not None),
+            ],
         ),
         *(
             ask.Section(f"{case.configuration} against {found.baseline}{where}", _paired(found, cases, case))

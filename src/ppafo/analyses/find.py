@@ -28,7 +28,7 @@ Condition = Annotated[str, Word("CONDITION", option="--such-that")]
 ACCURACY = 1.0e-6
 """Width of the last bracket, as a fraction of the range of values [-]."""
 FOLLOWS = "follows"
-"""Text of the condition that the run follows its reference, by the verdict of ``simulate``, within the reach."""
+"""Text of the condition that the run follows its reference, by the verdict of ``simulate``."""
 _SETTLED = "RMS error in the second half of the hold"
 """Number that decides in place of the error of one instant, for a loop that swings."""
 
@@ -92,7 +92,7 @@ def find(
         scenario: name of a scenario, or a .toml file
         vary: a number of the scenario or its device, and its range, for example 'supply.pressure=20..90 psi_g'
         such_that: a metric, <= or >=, and a limit, for example 'final_error <= 0.3 N m', or 'follows': the
-            run follows a reference that the actuator can give
+            run follows its reference
         highest: find the highest value; default: the lowest
         grid: number of evenly spaced values to try first; default 64
         overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated
@@ -126,14 +126,14 @@ def find(
             raise StudyError(f"grid = {grid}: must be at least 3 and at most 100,000")
         # Of noisy sensors the same 16 streams for all values, so that neighbours differ by the value alone.
         seeds = ask.seeds_of_noise([base], [path.path], 16, 1)
-        streams, reach_varies = max(1, seeds.size), ask.changes_reach([path.path])
+        streams = max(1, seeds.size)
         runs = ask.scenario_runs(base, [limit.metric], ask.RunCounter(grid * streams, progress), (), threads)
 
         def tried(values: ask.Floats) -> ask.Rows:
             columns = {path.path: np.tile(values, streams)}
             if seeds.size:
                 columns[ask.NOISE_SEED] = np.repeat(seeds, values.size)
-            return judged(runs.run(columns), limit, reach_varies, streams)
+            return judged(runs.run(columns), limit, streams)
 
         rows, index, outer = outermost(tried, low, high, grid, highest)
         values, is_met, remarks = rows["value"], rows["is_met"], list[str]()
@@ -147,7 +147,7 @@ def find(
         if row is None:
             row = int((np.nanargmin if limit.is_most else np.nanargmax)(rows["judged"]))
         # A loop that fails even at the nearest value is why no value meets the condition.
-        shown = [row] if (limit.text == FOLLOWS if index is not None else not rows["follows"][row]) else []
+        shown = [row] if (limit.text == FOLLOWS if index is not None else rows["is_missed"][row]) else []
         if outer is not None:
             try:
                 ask.with_overrides(base, [f"{path.path}={float(values[outer])!r} {SI}"])
@@ -262,13 +262,15 @@ def outermost(
         rows = {name: np.concatenate([column, more[name]])[order] for name, column in rows.items()}
 
 
-def judged(runs: ask.Rows, limit: ask.MetricLimit, reach_varies: bool, streams: int) -> ask.Rows:
+def judged(runs: ask.Rows, limit: ask.MetricLimit, streams: int) -> ask.Rows:
     """Return columns (values,) of judged runs (streams * values,).
 
     - ``metric``, ``spread``: mean and standard deviation over the noise streams [SI]; nan if a run failed
     - ``judged``: number compared with the limit: the mean of ``settled``; nan if the loop oscillates throughout
     - ``excess``: tracking error divided by its limit [-], the largest; up to 1 the reference is followed
-    - ``follows``, ``is_kept``, ``is_met``: True if the reference is followed in all streams, the limit kept, and both
+    - ``follows``, ``beyond_reach_on_purpose``: True if the reference is followed in all streams, or missed in any for
+      the reason that its scenario gives; ``is_missed``: True if it is missed in any for another reason
+    - ``is_kept``, ``is_met``: True if the limit is kept, and if the reference is not missed besides
     - ``unsettled``, ``oscillating``: number of runs that swing in the second half of the hold, and throughout
     """
 
@@ -277,37 +279,35 @@ def judged(runs: ask.Rows, limit: ask.MetricLimit, reach_varies: bool, streams: 
 
     # Nobody would build on a loop whose command turns all the time.
     metric, settled = runs[limit.metric], runs[f"judged_{limit.metric}"]
-    oscillates, fails = runs["oscillates"] == 1.0, runs["passes"] == 0.0
-    if limit.text == FOLLOWS:
-        # A run without a verdict is none that follows, and a torque just beyond the actuator's is not reached.
-        fails |= np.isnan(runs["follows"]) | ((runs["beyond_reach"] > 0.0) & reach_varies)
+    oscillates, on_purpose = runs["oscillates"] == 1.0, runs[ask.ON_PURPOSE]
+    follows = by_value(runs[FOLLOWS] == 1.0).all(axis=0)
+    is_missed = by_value((runs[FOLLOWS] == 0.0) & ~on_purpose).any(axis=0)
     number = by_value(np.where(oscillates, np.nan, settled)).mean(axis=0)
-    is_kept, follows = np.asarray(limit.is_kept(number)), np.logical_not(by_value(fails).any(axis=0))
+    is_kept = np.asarray(limit.is_kept(number))
     return {
         "metric": by_value(metric).mean(axis=0),
         "judged": number,
         "spread": by_value(metric).std(axis=0, ddof=min(1, streams - 1)),
         "excess": by_value(runs["excess"]).max(axis=0),
-        "follows": follows,
+        FOLLOWS: follows,
+        ask.ON_PURPOSE: by_value(on_purpose).any(axis=0),
+        "is_missed": is_missed,
         "is_kept": is_kept,
-        "is_met": is_kept & follows,
+        # A run without a verdict is none that follows, nor one that misses its reference.
+        "is_met": is_kept & (follows if limit.text == FOLLOWS else ~is_missed),
         "unsettled": by_value(settled > metric).sum(axis=0),
         "oscillating": by_value(oscillates).sum(axis=0),
     }
 
 
 def _verdict(base: Scenario, path: ask.VariedPath, value: float, has_remedy: bool) -> str:
-    """Return value [SI] and verdict of its run, a torque beyond the actuator's included, with the remedy if asked."""
+    """Return value [SI] and verdict of its run, with the remedy if asked."""
     # Given in the unit of the range, the value and what is said of it are in that unit.
     result = ask.simulate(ask.with_overrides(base, [f"{path.path}={path.quote(value, '.17g')}"]))
     # The remedy that succeeds decides between possible causes.
     verdict = ask.verdict_of(result)
-    beyond = float(ask.shortfall(result.scenario).max())
     said = verdict.sentence
-    # A value that follows within the limits may lie beyond reach, and is none to be found.
-    if not verdict.fails and beyond > 0.0 and ask.changes_reach([path.path]):
-        said = f"{ask.CRITERION_TEXTS['reach']} {ask.change_text(result.scenario.controlled, beyond)}"
-    elif verdict.fails and not has_remedy:
+    if verdict.fails and not has_remedy:
         intended = f"intended: {verdict.accepted}" if verdict.accepted else ""
         said = "; ".join(filter(None, (verdict.found, verdict.cause, intended)))
     said = "; ".join(filter(None, (said, ask.standing_still(result, not verdict.fails))))
@@ -321,7 +321,7 @@ def _finding(found: Threshold, rows: ask.Rows, row: int, kind: ask.Kind, base: S
     """
     values, of_limit, is_verdict = rows["value"], ask.of_metric(found.metric), found.condition == FOLLOWS
     # Values that meet the condition although the run does not follow its reference.
-    missed = 0 if is_verdict else int(np.count_nonzero(~rows["follows"] & rows["is_kept"]))
+    missed = 0 if is_verdict else int(np.count_nonzero(rows["is_missed"] & rows["is_kept"]))
     meets = "lets the run follow its reference" if is_verdict else f"meets {found.condition}"
     meets += " and follows its reference" * bool(missed)
     name, number = found.metric, float(rows["metric"][row])
@@ -358,6 +358,8 @@ def _finding(found: Threshold, rows: ask.Rows, row: int, kind: ask.Kind, base: S
         remarks.append(f"in {turning} of {found.runs} runs the loop oscillates: not met")
     if missed:
         remarks.append(f"at {missed} values the condition is met, but the reference is not followed")
+    if on_purpose := int(np.count_nonzero(rows[ask.ON_PURPOSE] & rows["is_met"])):
+        remarks.append(f"at {on_purpose} values the condition is met, with a reference beyond reach on purpose")
     # Ends of intervals that are values of the grid are not bracketed as the value found is.
     grid, met = values[rows["is_of_grid"]], f"the condition is met{' and the reference followed' * bool(missed)}"
     exact = (values[0], values[-1], found.value)
@@ -380,8 +382,7 @@ def _finding(found: Threshold, rows: ask.Rows, row: int, kind: ask.Kind, base: S
                 "Metric over the value",
                 panels=(_panel(found, rows, kind, of_limit, met),),
                 name="find",
-                caption=f"The {drawn or 'metric'} over the value; dashed: the limit; shaded and full: where {met}"
-                f"{'; a torque beyond the reach of the actuator does not meet it' * is_verdict}.",
+                caption=f"The {drawn or 'metric'} over the value; dashed: the limit; shaded and full: where {met}.",
             ),
         ),
         found=replace(found, said=said, remarks=remarks),

@@ -372,7 +372,7 @@ class Influences:
     ``maximum_failed``: fraction of the runs above which failures are refused
     ``paths``: paths of the uncertain values
     ``runs``, ``failed``: number of runs, and of failed runs
-    ``not_following``: number of completed runs that do not follow their reference
+    ``tracking``: completed runs that follow their reference, do not, or are beyond reach on purpose
     ``constant``: metrics that no value influences, with the number that they are in every run [SI]
     ``gains``: remarks on controller gains that follow the uncertain values or are kept from another kind; or empty
     """
@@ -386,7 +386,7 @@ class Influences:
     paths: list[str]
     runs: int
     failed: int
-    not_following: int
+    tracking: ask.TrackingCounts
     metrics: list[MetricSensitivity]
     constant: dict[str, float]
     study: str = ""
@@ -475,7 +475,7 @@ def analyse(
         paths=list(uncertainty.paths),
         runs=runs.count,
         failed=runs.failures,
-        not_following=int(np.count_nonzero(rows["off"])),
+        tracking=ask.tracking_counts(rows, runs.count - runs.failures),
         metrics=found,
         constant=constant,
     )
@@ -490,10 +490,8 @@ def finding_of(found: Influences) -> Finding[Influences]:
         f"{found.failed:,} runs failed; up to {100.0 * found.maximum_failed:g} % are allowed, and every "
         f"{found.noun[:-1]} with a failed run is left out",
     ]
-    if found.not_following:
-        sentences.append(
-            f"in {found.not_following:,} runs the reference is not followed; the indices include these runs"
-        )
+    if found.tracking.do_not_follow or found.tracking.beyond_reach_on_purpose:
+        sentences.append(f"{found.tracking.sentence}; the indices include all of them")
     for name, number in found.constant.items():
         sentences.append(f"{name} is {ask.of_metric(name).text(number)} in every run: no value influences it")
     caption = f"Left: indices with confidence bands, {first} filled{''.join(f', {other} open' for other in others)}."

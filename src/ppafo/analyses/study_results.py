@@ -20,17 +20,16 @@ from typing import TYPE_CHECKING, Any
 
 from ppafo.analyses import ask, np
 from ppafo.arguments import checked
+from ppafo.documents.json_text import plain
 from ppafo.errors import DataError, StudyError, UnitError, at_fault, refused_as
 from ppafo.report.kind import YES_OR_NO, of_stored_metric
 from ppafo.report.style import font_size
 from ppafo.signals.recording import CHANNELS
+from ppafo.simulation.tracking.rule import ON_PURPOSE
 from ppafo.storage.parquet import as_numpy, encode_texts, matrix_of, parquet_bytes
 from ppafo.study.blocks import MAXIMUM_RUNS_OF_CHUNK, samples_of
-from ppafo.study.runs import joined
+from ppafo.study.runs import FOLLOWS, OSCILLATES, TrackingCounts, joined, tracking_counts
 from ppafo.study.store import (
-    FOLLOWS,
-    ON_PURPOSE,
-    OSCILLATES,
     STATUSES,
     StudyFolder,
     chunk_file,
@@ -60,12 +59,6 @@ _MAXIMUM_POINTS = 3000
 """Largest number of runs in a curve, or in the points of a panel."""
 _HISTOGRAM_BINS = 60
 """Largest number of bins in the histogram of a metric."""
-_FLAGS = {
-    "oscillating": "the loop oscillates (column 'oscillates')",
-    "not_following": "the reference is not followed (column 'follows')",
-    "without_verdict": "it is not known whether the reference is followed (column 'follows' is empty)",
-}
-"""Counts of the summary that are said, in words."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -145,7 +138,7 @@ class StudyResults:
                 zero, one = (from_si(number, unit, shown[name]) for number in (0.0, 1.0))
             frame[name] = zero + (one - zero) * frame[name]
         # A truth that is not known stays empty.
-        frame = frame.astype({name: "boolean" for name in (OSCILLATES, FOLLOWS) if name in frame})
+        frame = frame.astype({name: "boolean" for name in (OSCILLATES, FOLLOWS, ON_PURPOSE) if name in frame})
         frame.attrs = {"title": self.name, "units": shown | dict(units or {})}
         return frame
 
@@ -171,8 +164,13 @@ class StudyResults:
 
     def known(self, configuration: str, column: str) -> ask.Floats:
         """Return the finite values of a column of the runs of a configuration."""
-        values = np.concatenate([part.column(column).to_numpy() for part in self.chunks([column], configuration)])
+        values = np.concatenate([as_numpy(part)[column] for part in self.chunks([column], configuration)])
         return np.asarray(values[np.isfinite(values)])
+
+    def tracking(self, configuration: str, completed: int) -> TrackingCounts:
+        """Return how many ``completed`` runs of a configuration follow their reference, do not, or are beyond reach."""
+        rows = {column: self.known(configuration, column) for column in (FOLLOWS, ON_PURPOSE)}
+        return tracking_counts(rows, completed)
 
     def chunks(self, columns: Sequence[str] | None = None, configuration: str | None = None) -> Iterator[pa.Table]:
         """Yield some columns chunk by chunk, of one configuration or of all."""
@@ -235,8 +233,7 @@ def summarise(study: Study, results: StudyResults) -> StudyResults:
                 failures += part.filter(~rows).slice(0, _EXAMPLES - len(failures)).to_pylist()
     # A run that diverged has a time at which it did; one that was refused never began.
     failed, diverged = study.runs - sum(completed.values()), sum(known(name, "failure_time").size for name in names)
-    follow = {name: known(name, FOLLOWS) for name in names}
-    missed = {name: np.count_nonzero(follow[name] == 0.0) - np.count_nonzero(known(name, ON_PURPOSE)) for name in names}
+    tracking = {name: results.tracking(name, completed[name]) for name in names}
     summary: dict[str, Any] = {
         "study": study.name,
         **({"overrides": list(study.changes)} if study.changes else {}),
@@ -246,11 +243,10 @@ def summarise(study: Study, results: StudyResults) -> StudyResults:
         "refused": failed - diverged,
         "completed_by_configuration": completed,
         "oscillating": {name: int(np.count_nonzero(known(name, OSCILLATES))) for name in names},
-        "not_following": {name: int(count) for name, count in missed.items()},
-        "without_verdict": {
-            each.name: completed[each.name] - follow[each.name].size
+        "tracking": {
+            each.name: plain(tracking[each.name])
             for each in study.configurations
-            if follow[each.name].size or each.scenario.follows_reference
+            if each.scenario.follows_reference or tracking[each.name].without_verdict < completed[each.name]
         },
         "failures": failures,
         "configurations": {
@@ -344,12 +340,11 @@ def finding_of(results: StudyResults) -> ask.Finding[StudyResults]:
     for first in summary["failures"][:1]:
         failed = f"{document['runs'] - summary['completed']:,} of {document['runs']:,} runs failed and have no metrics"
         said.append(f"{failed}; the first is run {first['run']}: {first['reason']}")
-    for key, words in _FLAGS.items():
-        for name, whole in completed.items():
-            # Where some runs have a verdict, 0 is news too.
-            is_news = key == "not_following" and summary["without_verdict"].get(name, whole) < whole
-            if (count := summary[key].get(name, 0)) or is_news:
-                said.append(f"{name}: in {count:,} of {whole:,} runs ({100.0 * count / max(whole, 1):.3g} %) {words}")
+    for name, count in summary["oscillating"].items():
+        share = 100.0 * count / max(completed[name], 1)
+        oscillating = f"{name}: in {count:,} of {completed[name]:,} runs ({share:.3g} %) the loop oscillates"
+        said += [oscillating] if count else []
+    said += _tracking_texts(results)
     # With fewer than half of the runs, the median would be that of the failed ones.
     useless = [name for name, count in completed.items() if 2 * count < runs]
     said += [f"{name}: most runs failed: the statistics of the others do not describe the study" for name in useless]
@@ -387,6 +382,14 @@ def finding_of(results: StudyResults) -> ask.Finding[StudyResults]:
         passed=not useless,
         overrides=document.get("overrides", ()),
     )
+
+
+def _tracking_texts(results: StudyResults) -> list[str]:
+    """Return how many runs of each configuration with a reference follow it, do not, or are beyond reach on purpose."""
+    summary, completed = results.summary, results.summary["completed_by_configuration"]
+    # Folders of earlier versions name these configurations elsewhere.
+    judged = summary["tracking"] if "tracking" in summary else summary["without_verdict"]
+    return [f"{name}: {results.tracking(name, completed[name]).sentence}" for name in judged]
 
 
 def _metrics(results: StudyResults, name: str) -> ask.Section:
@@ -458,7 +461,8 @@ def _figure(results: StudyResults) -> ask.Section:
         panels=partial(_panels, results, metrics, names, varied, grid),
         name="figure",
         caption=f"Not drawn, because without a difference in the runs: {constant}. " * bool(constant)
-        + f"Not drawn, unless outputs.metrics names at most {most}: {left_out}." * bool(left_out),
+        + f"Not drawn, unless outputs.metrics names at most {most}: {left_out}. " * bool(left_out)
+        + f"{'; '.join(_tracking_texts(results))}." * (FOLLOWS in metrics),
         across=len(names) if is_compared else min(2, max(1, count)),
         size=(2.7, 2.3) if is_compared else (2.9, 2.4),
         title=title,

@@ -236,6 +236,7 @@ class GainResult:
         of the hold, the error at a single instant does not count
     ``off``, ``share_off``: fraction by which the runs exceed the tracking limits, and fraction of the draws that do
     ``beyond_reach``: fraction of the draws in which the reference requires more torque than the supply allows
+    ``tracking``: fresh draws that follow the reference, do not, or are beyond reach on purpose
     ``metrics``, ``result``: metrics and result of one run of the nominal device
     """
 
@@ -251,6 +252,7 @@ class GainResult:
     fresh_violation: float
     fresh_share_without_value: float
     beyond_reach: float
+    tracking: ask.TrackingCounts
     metrics: Mapping[str, ask.Metric]
     result: ask.Result = field(compare=False, repr=False)
 
@@ -267,14 +269,14 @@ class Tuned:
 
     ``overrides`` turn the scenario of the tuning file into the tuned one, and ``lines`` are those of the gains;
     ``bounds_reached`` are gains that ended at a bound, beyond which a better value may lie. The best of the ``starts``
-    is the first. ``follows``: False for a nominal run that should follow its reference and does not.
+    is the first. ``follows``: True if the nominal run follows its reference, None if it is not judged.
     """
 
     tuning: str
     scenario: str
     verdict: str
     is_feasible: bool
-    follows: bool
+    follows: bool | None
     overrides: list[str]
     lines: list[str]
     bounds_reached: dict[str, Literal["minimum", "maximum"]]
@@ -462,6 +464,7 @@ def solve_tuning(
             fresh_violation=float(fresh_scores["violation"][0]),
             fresh_share_without_value=float(fresh_scores["without_value"][0]),
             beyond_reach=float(np.mean(over_fresh["beyond_reach"] > 0.0)),
+            tracking=ask.tracking_counts(over_fresh, int(np.count_nonzero(~over_fresh[ask.FAILED]))),
             metrics=result.metrics,
             result=result,
         )
@@ -479,7 +482,7 @@ def solve_tuning(
         scenario=scenario.name,
         verdict=f"{problem.name}: {_verdict(problem, before, after, tracking.sentence if tracking.is_useless else '')}",
         is_feasible=after.is_feasible,
-        follows=not tracking.is_useless,
+        follows=tracking.follows,
         overrides=list(ask.over(scenario.origin.overrides, lines, valve=scenario.device.valve_name)),
         lines=lines,
         bounds_reached=bounds,
@@ -659,6 +662,7 @@ def _remarks(
         f"candidates, {runs:,} runs; {sum(start.is_settled for start in starts)} of {len(starts)} converged "
         "before the maximum number of generations",
         kept,
+        f"over the fresh draws: {after.tracking.sentence}" if after.fresh else "",
     ]
     remarks += [
         f"{path} ended at its {bound}: a better value may lie beyond; widen the bounds if the device allows it"
@@ -737,7 +741,7 @@ def _finding(tuned: Tuned) -> ask.Finding[Tuned]:
             ask.Section("To use the gains", code=used),
         ),
         found=tuned,
-        passed=after.is_feasible and tuned.follows,
+        passed=after.is_feasible and (tuned.follows is not False or bool(after.result.tracking.accepted)),
         files={"overrides.txt": pasted.encode},
         overrides=problem.changes,
     )

@@ -60,7 +60,7 @@ def simulate(
             {
                 "scenario": loaded.name,
                 "status": plain(report.result.status),
-                "tracking": {**plain(tracking), "sentence": tracking.sentence},
+                "tracking": plain(tracking),
                 "gains": plain(report.gains),
                 "metrics": {name: plain(metric) for name, metric in report.result.metrics.items()},
                 **({"overrides": changed} if changed else {}),

@@ -81,4 +81,4 @@ def _excess(base: Scenario, metrics: Mapping[str, Floats], columns: Mapping[str,
         most = np.array([most_reversals(base, float(each)) for each in duration])  # type: ignore[assignment]
     least = smallest_change(base) if base.follows_reference else 0.0
     judged = tracking_excess(varied, metrics, most, least)
-    return np.where(judged.excused, np.minimum(judged.largest, 1.0), judged.largest)
+    return np.where(judged.on_purpose, np.minimum(judged.largest, 1.0), judged.largest)

@@ -66,6 +66,8 @@ MOST_REVERSALS = 3.0
 """Number of reversals on the hold above which a loop counts as oscillating; settling takes one or two."""
 _TINY = 1.0e-300
 """Divisor in place of 0."""
+_NOTHING_ASKED = 1.0e300
+"""Lowest reference before any is judged, finite, since the errors of numbers are estimated by their differences."""
 
 
 class PartSums(NamedTuple):
@@ -75,8 +77,9 @@ class PartSums(NamedTuple):
     of squared errors, ``total`` that of errors, ``taken`` the number of samples, ``reference_squares`` and
     ``reference_total`` the sums for the reference less the initial value, ``lag_squares`` and ``lag_total`` those of
     the allowed lag, ``swing`` the reversal state of the error, ``lag_swing`` that of a loop that only lags,
-    ``lowest_error`` and ``highest_error`` its extremes. ``first`` and ``last`` are the reference before the part and at
-    its end, and ``path`` is the sum of its changes in between, without their sign.
+    ``lowest_error`` and ``highest_error`` its extremes, ``lowest_reference`` and ``highest_reference`` those of the
+    reference. ``first`` and ``last`` are the reference before the part and at its end, and ``path`` is the sum of its
+    changes in between, without their sign.
     """
 
     start: float = 0.0
@@ -95,6 +98,8 @@ class PartSums(NamedTuple):
     lag_swing: Swing = Swing(0.0, UNDECIDED, 0.0)
     lowest_error: float = 0.0
     highest_error: float = 0.0
+    lowest_reference: float = 0.0
+    highest_reference: float = 0.0
     first: float = 0.0
     last: float = 0.0
     path: float = 0.0
@@ -157,6 +162,8 @@ class SettledPart(NamedTuple):
     """Number of periods of a sine in the part; infinite for another reference."""
     is_reference_smooth: float = 0.0
     """1 for a reference without steps and corners."""
+    beyond_reach: float = 0.0
+    """Largest torque of the reference in all judged parts that the actuator cannot give [N m]."""
     first: float = 0.0
     """First judged sample of a recorded task."""
     last: float = 0.0
@@ -284,6 +291,7 @@ class SettledSums(NamedTuple):
     the reference, and ``command`` the reversals of the command in the judged samples of the part. ``begun`` is the
     initial controlled value, ``lowest`` and ``highest`` its extremes. ``met_upwards`` is 1 once the value has been at
     or below the reference, and ``top`` the highest value since then; ``met_downwards`` and ``bottom`` are the reverse.
+    ``lowest_asked`` and ``highest_asked`` are the extremes of the reference in all earlier parts that are judged.
     """
 
     part: PartSums
@@ -301,6 +309,8 @@ class SettledSums(NamedTuple):
     top: float
     met_downwards: float
     bottom: float
+    lowest_asked: float
+    highest_asked: float
 
 
 def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
@@ -317,6 +327,8 @@ def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
             swing=Swing(error, UNDECIDED, error),
             lowest_error=error,
             highest_error=error,
+            lowest_reference=reference,
+            highest_reference=reference,
             first=reference,
             last=reference,
         ),
@@ -334,6 +346,8 @@ def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
         top=value,
         met_downwards=1.0 if error >= 0.0 else 0.0,
         bottom=value,
+        lowest_asked=_NOTHING_ASKED,
+        highest_asked=-_NOTHING_ASKED,
     )
 
 
@@ -353,6 +367,11 @@ def meets(course: ReferenceSummary, sample: Sample) -> bool:
     return course.start_up == 0.0 and abs(sample.value - sample.reference) <= LARGEST_SHARE * course.largest
 
 
+def nearer(value: float, extreme: float, share: float) -> float:
+    """Return an extreme of earlier samples, of which a ``share`` counts, for the ``value`` of the present one."""
+    return extreme if share == 1.0 else value + share * (extreme - value)
+
+
 def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, late: float, lag: float) -> PartSums:
     """Return the sums of the present part with a sample, anew where the part is not judged yet.
 
@@ -361,12 +380,12 @@ def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, late
     before, error, reference = state.part, sample.value - sample.reference, sample.reference
     # From the initial value, or the square of a pressure would hide its change.
     ahead = reference - state.begun
-    # Share of the parts before, for a move after a short rest.
-    is_new, joined = course.is_new > 0.0, 1.0 - before.share
     is_first = course.part_start == 0.0 and course.rests == 0.0
     begins = course.start_up > 0.0 and sample.number >= course.start_up and sample.number < course.start_up + 1.0
     is_met = state.met == 0.0 and 2.0 * sample.number < course.samples - 1.0 and meets(course, sample)
     anew = state.waits > 0.0 or (is_first and (begins or is_met))
+    # Share of the samples before: all of the part, and of the parts before a move after a short rest.
+    of_before = 0.0 if anew else 1.0 - before.share if course.is_new > 0.0 else 1.0
     least = OSCILLATION_THRESHOLD * course.largest
     return PartSums(
         start=before.start,
@@ -383,16 +402,10 @@ def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, late
         # A lag that motion excuses is no reversal.
         swing=begun_swing(next_swing(before.swing, error, least + lag), error, anew),
         lag_swing=begun_swing(next_swing(before.lag_swing, late, least), late, anew),
-        lowest_error=error
-        if anew
-        else error + joined * min(before.lowest_error - error, 0.0)
-        if is_new
-        else min(before.lowest_error, error),
-        highest_error=error
-        if anew
-        else error + joined * max(before.highest_error - error, 0.0)
-        if is_new
-        else max(before.highest_error, error),
+        lowest_error=nearer(error, min(before.lowest_error, error), of_before),
+        highest_error=nearer(error, max(before.highest_error, error), of_before),
+        lowest_reference=nearer(reference, min(before.lowest_reference, reference), of_before),
+        highest_reference=nearer(reference, max(before.highest_reference, reference), of_before),
         first=before.first,
         last=reference,
         path=abs(reference - before.last) + before.path,
@@ -426,6 +439,8 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
         top=value if met_upwards > state.met_upwards else max(state.top, value),
         met_downwards=met_downwards,
         bottom=value if met_downwards > state.met_downwards else min(state.bottom, value),
+        lowest_asked=state.lowest_asked,
+        highest_asked=state.highest_asked,
     )
 
 
@@ -455,6 +470,8 @@ def blend(first: PartSums, rest: PartSums, of_first: float) -> PartSums:
         lag_swing=blended_swing(first.lag_swing, rest.lag_swing, of_first),
         lowest_error=min(first.lowest_error, rest.lowest_error),
         highest_error=max(first.highest_error, rest.highest_error),
+        lowest_reference=min(first.lowest_reference, rest.lowest_reference),
+        highest_reference=max(first.highest_reference, rest.highest_reference),
         first=rest.last + of_path * (first.first - rest.last),
         last=rest.last,
         path=of_path * (first.path + 2.0 * rest.path),
@@ -477,12 +494,18 @@ def keep_worst(state: SettledSums, course: ReferenceSummary) -> SettledSums:
     is_late = ended.start > 0.0 or state.met > 0.0 or (course.start_up > 0.0 and ended.end > course.start_up)
     counts = is_late and (rests or ended.path > 0.0)
     share = min(max((ended.end - ended.start) / shortest_rest(course) - 1.0, 0.0), 1.0)
-    judged = worse(worse(state, course, state.before, share), course, ended, share if counts else 0.0)
+    asked = state._replace(
+        lowest_asked=min(state.lowest_asked, ended.lowest_reference) if counts else state.lowest_asked,
+        highest_asked=max(state.highest_asked, ended.highest_reference) if counts else state.highest_asked,
+    )
+    judged = worse(worse(asked, course, state.before, share), course, ended, share if counts else 0.0)
     absent = PartSums(
         start=ended.start,
         since=ended.since,
         lowest_error=ended.lowest_error,
         highest_error=ended.highest_error,
+        lowest_reference=ended.lowest_reference,
+        highest_reference=ended.highest_reference,
         first=ended.first,
     )
     joined = blend(state.before if state.before.taken > 0.0 else absent, ended, 1.0 - share)
@@ -491,7 +514,7 @@ def keep_worst(state: SettledSums, course: ReferenceSummary) -> SettledSums:
     after_rest = judged._replace(
         part=none if course.rests > 0.0 else joined, before=joined if course.rests > 0.0 else PartSums()
     )
-    after_move = state._replace(part=none, before=ended if counts else PartSums())
+    after_move = asked._replace(part=none, before=ended if counts else PartSums())
     following = after_rest if rests else after_move
     return following if course.is_new > 0.0 else state
 
@@ -531,6 +554,8 @@ def read_reversals(readings: Readings) -> Floats:
 
 PART_SUMS = tuple(name for name in PartSums._fields if name not in ("start", "since", "end"))
 """Sums of a part by which it is judged."""
+OF_RUN = ("begun", "lowest", "highest", "top", "bottom", "lowest_asked", "highest_asked")
+"""Numbers of the whole run by which its parts are judged."""
 _SETTLED = f"meters.{SETTLED.name}"
 _NUMBERS: dict[str, Callable[[Readings], Floats]] = {
     **{
@@ -538,7 +563,7 @@ _NUMBERS: dict[str, Callable[[Readings], Floats]] = {
         for prefix, part in (("settled", "part"), ("before", "before"), ("worst", "worst"))
         for name in PART_SUMS
     },
-    **{f"settled_{name}": ReadAt((f"{_SETTLED}.{name}",)) for name in ("begun", "lowest", "highest", "top", "bottom")},
+    **{f"settled_{name}": ReadAt((f"{_SETTLED}.{name}",)) for name in OF_RUN},
     "settled_error": ReadAt((f"{_SETTLED}.part.squares", f"{_SETTLED}.part.taken"), root_mean),
     "settled_turns": ReadAt((f"{_SETTLED}.part.swing.turns",), count_of),
     "settled_reversals": read_reversals,

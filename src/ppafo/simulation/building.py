@@ -195,7 +195,7 @@ def build_scenario(reading: DocumentReader) -> Scenario:
             supply_line=supply_line,
             links={**initial_links, **reference_links},
             controlled=controlled,
-            beyond_reach=str(value_at(document, PURPOSE) or ""),
+            beyond_reach=_purpose(reading, controlled),
         )
         scenario = with_settings(reading, scenario, law_settings(law, controlled))
         problem = reference_problem(scenario)
@@ -213,6 +213,15 @@ def build_scenario(reading: DocumentReader) -> Scenario:
             if law.plan is not None:
                 device.check_torque_constant("a fixed-point controller")
         return scenario
+
+
+def _purpose(reading: DocumentReader, controlled: str) -> str:
+    """Return the reason for a reference beyond reach; "" without, or where an override changes the level it is for."""
+    levels = CONTROLLED[controlled].level.unit, CONTROLLED[controlled].difference
+    settings = reference_settings(kind_at(reading.document, "reference"), controlled)
+    changed = {f"reference.{setting.name}" for setting in settings if setting.unit in levels} & reading.overridden
+    is_kept = not changed or PURPOSE in reading.overridden
+    return str(value_at(reading.document, PURPOSE) or "") if is_kept else ""
 
 
 def check_regulated(device: Device, law: ControllerKind, controlled: str) -> None:

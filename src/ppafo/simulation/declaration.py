@@ -7,7 +7,7 @@ errors and values that no solver could handle.
 
 import functools
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields, replace
 from importlib import resources
 from typing import Any
@@ -73,8 +73,6 @@ SAMPLING = (RATE, PERIOD)
 
 PURPOSE = "reference.beyond_reach"
 """Key of a file with the reason why its reference lies beyond the reach of the device."""
-_OF_REACH = ("reference.", "supply.", "actuator.", "motion.", "device.")
-"""Prefixes of paths that belong to a reference or affect the reach of the device."""
 ANGLE_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
 
 SUPPLY_LINE = "supply_line"
@@ -168,11 +166,6 @@ def quantities(document: Mapping[str, Any], motion: MotionSection | None = None)
     """Return the declaration of every number that a document with its components has, keyed by path."""
     lines = () if SUPPLY_LINE in document else line_paths()
     return {path: item for path, item in quantities_in(declared(document, motion)).items() if path not in lines}
-
-
-def changes_reach(paths: Iterable[str]) -> bool:
-    """True if any path belongs to a reference or affects the reach of the device."""
-    return any(path.startswith(_OF_REACH) for path in paths)
 
 
 def law_settings(law: ControllerKind, controlled: str) -> tuple[Quantity, ...]:

@@ -125,20 +125,27 @@ def matrix_of(column: "pa.ChunkedArray") -> "np.ndarray[Any, Any]":
 
 
 def as_numpy(table: "pa.Table") -> dict[str, "np.ndarray[Any, Any]"]:
-    """Return the columns as NumPy arrays; texts become object arrays, an empty cell None."""
+    """Return the columns as NumPy arrays; texts become object arrays, an empty cell None; a truth is 1 or 0, or nan."""
+    return {name: _numpy(table.column(name)) for name in table.column_names}
+
+
+def _numpy(column: "pa.ChunkedArray") -> "np.ndarray[Any, Any]":
     import pyarrow as pa
 
-    return {
-        field.name: _texts(column) if pa.types.is_dictionary(field.type) else column.to_numpy()
-        for field, column in zip(table.schema, table.columns, strict=True)
-    }
-
-
-def _texts(column: "pa.ChunkedArray") -> "np.ndarray[Any, Any]":
+    if pa.types.is_boolean(column.type):
+        return np.asarray(column.cast("float64").to_numpy())
+    if not pa.types.is_dictionary(column.type):
+        return np.asarray(column.to_numpy())
     encoded = column.combine_chunks()
     texts = np.array([*encoded.dictionary.to_pylist(), None], dtype=object)
-    rows: np.ndarray[Any, Any] = texts[encoded.indices.fill_null(-1).to_numpy()]
-    return rows
+    return np.asarray(texts[encoded.indices.fill_null(-1).to_numpy()])
+
+
+def encode_truths(numbers: "np.ndarray[Any, Any]") -> "pa.BooleanArray":
+    """Return a column of truth values, true for 1, false for 0, missing for nan."""
+    import pyarrow as pa
+
+    return pa.array(numbers == 1.0, mask=np.isnan(numbers))
 
 
 def encode_texts(codes: "np.ndarray[Any, Any]", texts: Sequence[str]) -> "pa.DictionaryArray":

@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, final
 
@@ -22,6 +23,7 @@ from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking import most_reversals
 from ppafo.simulation.tracking.rule import (
+    ON_PURPOSE,
     TrackingExcess,
     command_turning,
     needed_metrics,
@@ -41,6 +43,8 @@ _BLOCKS, _FEWEST_OF_BLOCK = 64, 256
 """Number of blocks in which runs are submitted to an executor, and smallest number of runs of a block."""
 FAILED, OVER_TIME = "failed", "_over_time"
 """Name of the column of failed runs, and suffix of the name of a column with a trace."""
+OSCILLATES, FOLLOWS = "oscillates", "follows"
+"""Names of the columns of the verdict on a run beside ``ON_PURPOSE``: the loop oscillates; it follows its reference."""
 _AT_ONCE, _SLOW_AT_ONCE = 16_384, 32
 """Largest number of runs between two progress reports: in general, and with a Python controller."""
 _FIRST_AT_ONCE, _BETWEEN_REPORTS = 1024, 3.0
@@ -225,7 +229,7 @@ def verdicts(
     - ``excess``: largest tracking number over its limit [-]: up to 1 the run follows its reference; nan if unknown
     - ``off``: excess above 1; 0 if unknown or on purpose
     - ``follows``, ``oscillates``: 1 or 0, nan if unknown
-    - ``passes``: as ``follows``, 1 also for a run that misses its reference on purpose, which is ``excused``
+    - ``beyond_reach_on_purpose``: True for a run that does not follow for that reason alone
     - ``turning``: True where the command alone turns too often
     - ``beyond_reach``: requested torque that the actuator cannot give [N m]
     """
@@ -239,15 +243,41 @@ def verdicts(
         turning = np.asarray(command_turning(scenario, metrics, most) > 1.0)
     return {
         "excess": found.largest,
-        # A run whose reference is beyond reach on purpose counts as one that follows.
-        "off": np.where(found.excused, 0.0, np.fmax(found.largest - 1.0, 0.0)),
-        "follows": found.follows,
-        "oscillates": found.oscillates,
-        "passes": found.passes,
-        "excused": found.excused,
+        # No controller can do better than a run whose reference is beyond reach on purpose.
+        "off": np.where(found.on_purpose, 0.0, np.fmax(found.largest - 1.0, 0.0)),
+        FOLLOWS: found.follows,
+        OSCILLATES: found.oscillates,
+        ON_PURPOSE: found.on_purpose,
         "turning": turning,
         "beyond_reach": found.beyond_reach,
     }
+
+
+@dataclass(frozen=True, slots=True)
+class TrackingCounts:
+    """Numbers of completed ``runs`` by the state of their tracking; those without a verdict apart."""
+
+    runs: int
+    follow: int
+    do_not_follow: int
+    beyond_reach_on_purpose: int
+    without_verdict: int
+
+    @property
+    def sentence(self) -> str:
+        """Counts in words."""
+        unknown = f"; without a verdict: {self.without_verdict:,}" * (self.without_verdict > 0)
+        return (
+            f"the reference is followed in {self.follow:,} of {self.runs:,} runs, not in {self.do_not_follow:,}; "
+            f"beyond reach on purpose: {self.beyond_reach_on_purpose:,}{unknown}"
+        )
+
+
+def tracking_counts(rows: Mapping[str, Floats], completed: int) -> TrackingCounts:
+    """Return the counts of ``completed`` runs by their columns ``follows`` and ``beyond_reach_on_purpose``."""
+    follow, missed = (int(np.count_nonzero(rows[FOLLOWS] == truth)) for truth in (1.0, 0.0))
+    on_purpose = int(np.count_nonzero(rows[ON_PURPOSE]))
+    return TrackingCounts(completed, follow, missed - on_purpose, on_purpose, completed - follow - missed)
 
 
 def settled(rows: Mapping[str, Floats], metric: str) -> Floats:

@@ -35,13 +35,14 @@ from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.ensemble.planning import absolute
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import scenario_document
+from ppafo.simulation.tracking.rule import ON_PURPOSE
 from ppafo.storage.files import LEFT_ASIDE, is_address, write_file
-from ppafo.storage.parquet import encode_texts, parquet_bytes, read_parquet
+from ppafo.storage.parquet import encode_texts, encode_truths, parquet_bytes, read_parquet
 from ppafo.storage.result_folder import MANIFEST
 from ppafo.studies.distributions import Floats
 from ppafo.studies.study import Configuration, Study
 from ppafo.study.blocks import Chunk, chunks_of, drawn_values, samples_of, varied_columns
-from ppafo.study.runs import FAILED, OVER_TIME, Rows, run_judged
+from ppafo.study.runs import FAILED, FOLLOWS, OSCILLATES, OVER_TIME, Rows, run_judged
 from ppafo.version import __version__
 from ppafo.wording import argument_text
 
@@ -59,8 +60,6 @@ _TRIED_RUNS = 8
 STATUSES = ("completed", "diverged", "refused")
 _PLAIN = "-"
 """Unit of a dimensionless column."""
-OSCILLATES, FOLLOWS, ON_PURPOSE = "oscillates", "follows", "beyond_reach_on_purpose"
-"""Names of the columns of flags: the loop of the run oscillates; the run follows its reference."""
 ASKED_ABOVE = 10_000_000_000
 """Size [bytes] above which a study only starts with ``--yes``."""
 _FIXED_BYTES_OF_ROW, _BYTES_OF_NUMBER, _BYTES_OF_SAMPLE, _BYTES_OF_FILE = 3, 8, 4, 12_000
@@ -380,15 +379,16 @@ def compute_chunk(
         is_varied = study.varies(path, configuration.name)
         shown = in_effect.get(path, drawn) if is_varied else np.full(part.runs, np.nan)
         columns[path] = (shown, study.units[path], "varied value")
-    not_known = "where not, empty where that is not known"
-    on_purpose = "1 where it does not, because the reference is beyond reach on purpose"
+    truths = {
+        OSCILLATES: "true where the loop oscillates, empty where that is not known",
+        FOLLOWS: "true where the run follows its reference, empty where that is not known",
+        ON_PURPOSE: "true where it does not, because the reference is beyond reach on purpose",
+    }
     columns |= {
         "status": (encode_texts(rows["status"], STATUSES), _PLAIN, "how the run ended"),
         "failure_time": (rows["failure_time"], "s", "time at which the run diverged"),
         "reason": (rows["reason"], _PLAIN, "why the run has no metrics"),
-        OSCILLATES: (rows["oscillates"], _PLAIN, "1 where the loop oscillates, empty where that is not known"),
-        FOLLOWS: (rows["follows"], _PLAIN, f"1 where the run follows its reference, 0 {not_known}"),
-        ON_PURPOSE: (rows["excused"].astype(float), _PLAIN, on_purpose),
+        **{name: (encode_truths(rows[name]), _PLAIN, summary) for name, summary in truths.items()},
     }
     for name in outputs.metrics:
         unit, error = METRICS[name].unit, f"{name}_error"

@@ -3,7 +3,6 @@
 import ast
 import math
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from ppafo.parameters.reach import supply_for, torque_reach
 from ppafo.running import simulate
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.tracking import tracking_in
-from ppafo.simulation.tracking.rule import excess_of_part, failure_of_task, most_reversals, task_parts
+from ppafo.simulation.tracking.rule import ON_PURPOSE, excess_of_part, failure_of_task, most_reversals, task_parts
 from ppafo.study.runs import run_judged
 
 TASK = "torque-task-proportional"
@@ -41,13 +40,15 @@ def test_a_torque_beyond_the_reach_is_said_and_a_file_may_say_why_it_asks_for_it
     assert told.sentence.startswith("the torque stays 1 N m below its reference (0.3 N m allowed); at 75 deg and 50")
     assert not told.is_useless
     assert told.accepted.startswith("above the 5.0 N m that 50 psi_g can hold")
-    for changed in ("reference.level=6.1 N m", "supply.pressure=49 psi_g", "actuator.torque_constant=14 cm^3"):
+    for changed in ("reference.ramp_time=2 s", "supply.pressure=49 psi_g", "actuator.torque_constant=14 cm^3"):
         assert not simulate(TASK, [changed]).tracking.is_useless
+    # The reason is that of one level: another one has to be given its own, while draws of a study keep it.
+    assert simulate(TASK, ["reference.level=9 N m"]).tracking.is_useless
+    assert simulate(TASK, ["reference.level=9 N m", "reference.beyond_reach=to wind up"]).tracking.accepted
     assert with_numbers(load_scenario(TASK), {"supply.pressure": 3.0e5}).beyond_reach == told.accepted
     # Gains that make the loop miss what it could reach are no purpose.
     assert simulate(TASK, ["reference.level=4 N m", "controller.proportional_gain=0.01"]).tracking.is_useless
-    scenario = replace(load_scenario(TASK, ["reference.level=9 N m"]), beyond_reach="")
-    verdict = verdict_of(simulate(scenario))
+    verdict = verdict_of(simulate(TASK, ["reference.level=9 N m"]))
     assert verdict.is_useless
     assert verdict.cause.startswith(
         "at 75 deg and 50 psi_g the actuator gives at most 5 N m; it follows with a higher supply"
@@ -183,9 +184,9 @@ def test_metered_runs_are_judged_as_their_recordings_are(scenario: str, column: 
     alone = [simulate(with_numbers(base, {column: value})).tracking for value in values]
     judged = run_judged(base, (), (), None, columns)
     assert (judged["follows"] == 1.0).tolist() == [verdict.follows for verdict in alone]
-    assert judged["excused"].tolist() == [bool(verdict.accepted) for verdict in alone]
-    if column == "valve.area":
-        assert judged["excused"].tolist() == [value > 1.0e-6 for value in values]
+    assert judged[ON_PURPOSE].tolist() == [bool(verdict.accepted) for verdict in alone]
+    if (scenario, column) == (TASK, "valve.area"):
+        assert judged[ON_PURPOSE].tolist() == [value > 1.0e-6 for value in values]
 
 
 def test_valves_that_swing_by_more_than_their_limit_do_not_follow_in_a_run_or_an_ensemble() -> None:

@@ -1,20 +1,26 @@
 """Verdicts on the whole reference: each rest and move is judged, with limits that do not jump."""
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet
 import pytest
 
 import ppafo
 from ppafo.cli.main import main
 from ppafo.loading import load_scenario
 from ppafo.metrics.metric import followed
+from ppafo.metrics.settled import SettledPart
+from ppafo.parameters.reach import torque_reach
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
 from ppafo.simulation.tracking.rule import (
+    ON_PURPOSE,
     excess_of_part,
+    excess_of_walk,
     needed_metrics,
     part_limits,
     settled_parts,
@@ -178,16 +184,71 @@ def test_a_walk_with_on_off_valves_is_judged_by_what_it_gives_in_push_off() -> N
     ]
 
 
+def test_reach_counts_where_and_by_how_much_it_is_exceeded() -> None:
+    base = load_scenario(TASK, [*PULSE, *FOLLOWING])
+    reach = torque_reach(base.device, math.radians(75.0))[1]
+    levels = reach * np.linspace(0.98, 1.08, 51)
+    rows = run_judged(base, (), (), None, {f"reference.value_{number:02}": levels for number in (2, 3)})
+    # A verdict flips where a twentieth of the level is missing on the hold, and nothing jumps before, the fall neither.
+    assert rows["follows"].tolist() == (levels - reach < 0.05 * levels).tolist()
+    assert np.max(np.abs(np.diff(rows["excess"]))) < 1.05 * 0.002 / 0.05
+
+
+def test_a_walk_that_gives_more_than_it_is_asked_for_exceeds_and_does_not_miss() -> None:
+    asked = SettledPart(wanted_change=8.0, rms_error=3.0, requested_peak=12.9, given_peak=19.7)
+    assert excess_of_walk(asked, 0.0, 15.0) == pytest.approx(19.7 / (1.5 * 12.9))
+    assert excess_of_walk(asked._replace(given_peak=13.0), 0.0, 15.0) < 1.0
+
+
+def test_a_move_that_overshoots_within_its_limit_says_so() -> None:
+    changes = ["kind=ramp_hold", "start_level=90 deg", "level=80 deg", "ramp_time=0.02 s"]
+    result = ppafo.simulate("cylinder-servo", ["run.duration=2 s", *(f"reference.{each}" for each in changes)])
+    beyond = math.radians(80.0) - float(np.min(result["angle"]))
+    assert f"overshoots by {math.degrees(beyond):.3g} deg (5 deg allowed)" in result.tracking.sentence
+
+
+def test_every_door_has_the_same_three_states(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    grid: dict[str, Any] = {"path": "supply.pressure", "kind": "grid", "first": "50 psi_g", "last": "60 psi_g"}
+    study = {
+        "schema_version": 1,
+        "name": "doors",
+        "configurations": [{"name": "task", "scenario": TASK}],
+        "vary": [{**grid, "count": 2}, {"path": "valve.area", "kind": "list", "values": ["0.3 mm^2", "10 mm^2"]}],
+        "outputs": {"metrics": ["rms_error"]},
+    }
+    finding = ppafo.sweep(study, out=tmp_path / "doors")
+    # A small valve misses the level at any pressure; 50 psi_g hold 5 of 6 N m.
+    states = [(False, False), (False, True), (False, False), (True, False)]
+    frame = pyarrow.parquet.read_table(tmp_path / "doors" / "runs" / "chunk-0000000.parquet").to_pandas()
+    assert list(zip(frame["follows"], frame[ON_PURPOSE], strict=True)) == states
+    assert [frame[name].dtype.kind for name in ("follows", ON_PURPOSE)] == ["b", "b"]
+    said = "task: the reference is followed in 1 of 4 runs, not in 2; beyond reach on purpose: 1"
+    counts = {"runs": 4, "follow": 1, "do_not_follow": 2, ON_PURPOSE: 1, "without_verdict": 0}
+    assert json.loads((tmp_path / "doors" / "summary.json").read_text(encoding="utf-8"))["tracking"] == {"task": counts}
+    assert finding.said[1] == said
+    assert said in finding.parts[0].caption
+    assert ppafo.load_study_results(tmp_path / "doors").said[1] == said
+    for row, (follows, on_purpose) in zip(frame.to_dict("records"), states, strict=True):
+        numbers = {path: row[path] for path in ("supply.pressure", "valve.area")}
+        tracking = simulate(with_numbers(load_scenario(TASK), numbers)).tracking
+        assert (tracking.follows, bool(tracking.accepted)) == (follows, on_purpose)
+    assert main(["simulate", TASK, "--json", "--out", str(tmp_path / "run")]) == 0
+    single = json.loads(capsys.readouterr().out)["tracking"]
+    assert (single["follows"], single[ON_PURPOSE]) == states[1]
+    tried = ppafo.find(TASK, vary="supply.pressure=50..60 psi_g", such_that="rms_error <= 5 N m", grid=3).found.tried
+    assert [tried[name][end] for end in (0, -1) for name in ("follows", ON_PURPOSE)] == [*states[1], *states[3]]
+
+
 def test_a_comparison_says_in_how_many_draws_each_configuration_follows() -> None:
-    level = ["reference.level=4.9 N m", "reference.ramp_time=2 s"]
-    finding = ppafo.compare(study="torque-task-uncertainty", draws=32, overrides=level)
+    overrides = ["reference.level=4.9 N m", "reference.beyond_reach=at some supplies", "reference.ramp_time=2 s"]
+    finding = ppafo.compare(study="torque-task-uncertainty", draws=32, overrides=overrides)
     (cases,) = finding.found.tasks.values()
-    followed_in = {case.configuration: case.following for case in cases}
+    counts = {case.configuration: case.draws for case in cases}
     # The nominal device is one draw of many: its pair of valves oscillates, and follows in some of them.
     assert next(case.verdict for case in cases if case.configuration == "solenoid") == "oscillates"
-    # As in a sweep: what is beyond reach on purpose in some draws is not missed.
-    assert 0 < followed_in["solenoid"] < followed_in["proportional"] == 32
-    assert f"{cases[0].following} of 32" in str(finding)
+    alone = counts["proportional"]
+    assert (alone.follow, alone.do_not_follow, alone.beyond_reach_on_purpose) == (30, 0, 2)
+    assert f"proportional: {counts['proportional'].sentence}" in str(finding)
 
 
 def test_an_angle_that_is_stuck_on_its_way_out_and_back_does_not_follow() -> None:

@@ -342,7 +342,7 @@ def _walk_data(comparison: WalkComparison, verdict: ask.Tracking) -> dict[str, A
             "overrides": list(origin.overrides),
         },
         "shown": dict(scenario.device.shown),
-        "tracking": {**plain(verdict), "sentence": verdict.sentence},
+        "tracking": plain(verdict),
         "gains": plain(ask.gains_of(scenario)),
         "minutes": float(worn.recording.time[-1]) / 60.0,
         **of_supply,

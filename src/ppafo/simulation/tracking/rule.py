@@ -6,7 +6,7 @@ the metrics of runs without one. "SI" is the SI unit of the controlled quantity.
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal, NamedTuple
 
@@ -69,7 +69,7 @@ One step of a quarter, above which a pair is called coarse, beyond each side of 
 LARGEST_PEAK = 1.5
 """Peak of the value divided by the wanted change [-]."""
 LARGEST_PEAK_WALK = 1.5
-"""Peak torque of a walk divided by the torque limit of its controller [-]."""
+"""Peak torque of a walk divided by the torque limit of its controller, or by the largest requested torque [-]."""
 LEAST_PEAK_WALK = 0.7
 """Largest torque of a walk in plantarflexion divided by the largest requested one; with less it does not follow [-]."""
 MOST_PER_STRIDE, MOST_PER_SECOND = 12.0, 10.0
@@ -84,6 +84,8 @@ SMALLEST_MOVE = 0.01
 """Change of the value divided by the wanted change, below which the value does not move [-]."""
 REVERSALS = "command_reversals"
 """Metric that counts reversals of the command."""
+ON_PURPOSE = "beyond_reach_on_purpose"
+"""Name of the state of a run that misses its reference for the reason alone that its scenario gives."""
 _ANGLES = 9
 """Number of angles between the stops at which the torque of a moving joint is evaluated."""
 _LEAST_REACH = 1.0e-9
@@ -104,6 +106,7 @@ Criterion = Literal[
     "movement",
     "peak",
     "missing peak torque",
+    "excess peak torque",
     "reach",
     "any reach",
 ]
@@ -267,7 +270,18 @@ def settled_parts(scenario: Scenario, metrics: Mapping[str, Floats], least: floa
         )
         return found
 
-    return [part(prefix) for prefix in ("settled", "before", "worst")]
+    parts = [part(prefix) for prefix in ("settled", "before", "worst")]
+    if scenario.controlled != TORQUE:
+        return parts
+    # Any part may be beyond reach, not the worst alone; the end of a ramp that is not seen to settle is not judged.
+    is_seen = np.asarray(parts[0].ends_on_ramp) == 0.0
+    most_of_last = np.where(is_seen, metrics["settled_highest_reference"], -np.inf)
+    least_of_last = np.where(is_seen, metrics["settled_lowest_reference"], np.inf)
+    reach = available_torque(scenario)
+    above = np.fmax(metrics["settled_highest_asked"], most_of_last) - reach[1]
+    below = reach[0] - np.fmin(metrics["settled_lowest_asked"], least_of_last)
+    beyond: Any = np.maximum(np.maximum(above, below), 0.0)
+    return [part._replace(beyond_reach=beyond) for part in parts]
 
 
 def smallest_change(scenario: Scenario) -> float:
@@ -335,8 +349,11 @@ def excess_of_walk(settled: SettledPart, turning: Floats | float, limit: Floats 
     """
     peak = settled.peak / np.where(np.asarray(limit) > 0.0, LARGEST_PEAK_WALK * limit, np.inf)
     lacking = LEAST_PEAK_WALK * settled.requested_peak / np.maximum(settled.given_peak, 1.0e-9)
+    excess = settled.given_peak / (LARGEST_PEAK_WALK * np.maximum(settled.requested_peak, _TINY))
+    # Of a walk that requests dorsiflexion alone there is no peak to exceed.
+    excess = np.where(np.asarray(settled.requested_peak) > 0.0, excess, 0.0)
     error = settled.rms_error / settled.wanted_change / LARGEST_SHARE_OF_WAVE
-    return np.maximum(np.maximum(turning, peak), np.maximum(error, lacking))
+    return np.maximum.reduce(np.broadcast_arrays(turning, peak, error, lacking, excess))
 
 
 def failure_of_walk(settled: SettledPart, turning: float, limit: float) -> Failure | None:
@@ -355,7 +372,7 @@ class _TaskExcess(NamedTuple):
     - ``oscillation``: oscillation of the value
     - ``overshoot``: peak of the value beyond the wanted change
     - ``standstill``: error of a value that does not move, 0 for others
-    - ``reach``: torque that is beyond the actuator's reach, and missing
+    - ``reach``: torque of the reference beyond the actuator's reach
     """
 
     error: Floats
@@ -382,11 +399,10 @@ def part_limits(settled: SettledPart, is_switched: bool) -> PartLimits:
     return PartLimits(LARGEST_SHARE_SWITCHED * wanted, mean, span, np.full_like(at_rest, np.inf))  # type: ignore[arg-type]
 
 
-def excess_of_part(settled: SettledPart, is_switched: bool, beyond: Floats | float = 0.0) -> _TaskExcess:
+def excess_of_part(settled: SettledPart, is_switched: bool) -> _TaskExcess:
     """Tracking numbers of a part of a task divided by their limits, except command reversals: up to 1 it follows.
 
-    ``is_switched`` is true for a valve without gradual openings, and ``beyond`` the torque beyond reach [N m]. The
-    numbers of ``settled`` may be arrays (runs,).
+    ``is_switched`` is true for a valve without gradual openings. The numbers of ``settled`` may be arrays (runs,).
     """
     wanted, mean_error, motion = settled.wanted_change, np.abs(settled.mean_error), np.asarray(settled.motion)
     error, oscillation = over_samples(error_and_oscillation, settled, part_limits(settled, is_switched))
@@ -398,11 +414,8 @@ def excess_of_part(settled: SettledPart, is_switched: bool, beyond: Floats | flo
     share = np.asarray(settled.rms_error / wanted)
     is_still = (share > LARGEST_SHARE) & (settled.value_range <= SMALLEST_MOVE * wanted)
     standstill = np.where(is_still, share / LARGEST_SHARE, 0.0)
-    # A pair swings by design, so that a torque beyond reach shows in the mean error rather than in the RMS error. The
-    # mean error of a wave hides its peaks, and a ramp may end before them.
-    missing = np.where(settled.rests, mean_error, np.maximum(mean_error, beyond))
-    is_beyond = (np.asarray(beyond) > 0.0) & (np.asarray(settled.ends_on_ramp) == 0.0)
-    reach = np.where(is_beyond, missing / (LARGEST_SHARE * wanted), 0.0)
+    # The wider limits of a pair, and the mean error of a wave with its peaks cut, hide a torque beyond reach.
+    reach = settled.beyond_reach / (LARGEST_SHARE * wanted)
     ratios = (error, oscillation, overshoot, standstill, reach)
     return _TaskExcess._make(np.broadcast_arrays(*(np.asarray(settled.share * each) for each in ratios)))
 
@@ -419,15 +432,6 @@ def failure_of_task(excess: _TaskExcess, turning: float) -> Failure | None:
     if excess.error > 1.0 or (excess.reach > 1.0 and excess.overshoot <= 1.0):
         return "does not follow"
     return "overshoots" if excess.overshoot > 1.0 else None
-
-
-def shortfall(scenario: Scenario) -> Floats:
-    """Largest reference minus the available torque [N m] in each run (runs,); 0 if the torque suffices."""
-    if scenario.controlled != TORQUE:
-        return np.zeros(1)
-    lowest, highest = available_torque(scenario)
-    least, most = profile_bounds(scenario.reference)
-    return np.atleast_1d(np.maximum(0.0, np.maximum(most - highest, lowest - least)))
 
 
 def available_torque(scenario: Scenario) -> tuple[Floats, Floats]:
@@ -448,17 +452,17 @@ def available_torque(scenario: Scenario) -> tuple[Floats, Floats]:
     return np.min(lowest, axis=0), np.max(highest, axis=0)
 
 
-def misses_for_reach(scenario: Scenario, parts: Iterable[SettledPart], turning: Floats | float) -> NDArray[np.bool_]:
+def misses_for_reach(scenario: Scenario, parts: Sequence[SettledPart], turning: Floats | float) -> NDArray[np.bool_]:
     """True for each run (runs,) that reach alone keeps from its reference: it gives what the actuator can give.
 
     ``parts`` are the judged parts, ``turning`` is the number of command reversals divided by its limit.
     """
-    lacking, switches = shortfall(scenario) > 0.0, only_switches(scenario, scenario.law)
-    if not lacking.any():
-        return lacking
-    reach = available_torque(scenario)
+    is_lacking = parts[0].beyond_reach > 0.0
+    if not np.any(is_lacking):
+        return np.asarray(is_lacking)
+    reach, switches = available_torque(scenario), only_switches(scenario, scenario.law)
     found = np.fmax.reduce([excess_of_part(_within_reach(part, *reach), switches).largest for part in parts])
-    return np.asarray(lacking & (np.fmax(found, turning) <= 1.0))
+    return np.asarray(is_lacking & (np.fmax(found, turning) <= 1.0))
 
 
 def _within_reach(part: SettledPart, lowest: Floats, highest: Floats) -> SettledPart:
@@ -480,6 +484,7 @@ def _within_reach(part: SettledPart, lowest: Floats, highest: Floats) -> Settled
         "error_range": np.maximum(part.error_range - np.ptp(beyond, axis=0), 0.0),
         "largest_error": np.maximum(part.largest_error - farthest, 0.0),
         # The error of a wave whose peaks are cut reverses more often than the wave.
+        "beyond_reach": 0.0,
         "error_reversals": np.where((np.asarray(part.rests) > 0.0) | (farthest == 0.0), part.error_reversals, 0.0),
         "reference_deviation": cut.std(axis=0),
     }
@@ -510,24 +515,19 @@ class TrackingExcess(NamedTuple):
     """Numbers of each run divided by their limits (runs,); nan if unknown.
 
     With ``largest`` up to 1 the run follows its reference, with ``oscillation`` up to 1 its loop does not oscillate.
-    ``beyond_reach`` [N m] is the requested torque that the actuator cannot reach (runs,), which the limits allow in
-    part. A run that does not reach it on purpose is ``excused``.
+    ``beyond_reach`` [N m] is the torque of the reference that the actuator cannot give, which the limits allow in part.
+    A run that misses its reference for that alone, as its scenario announces, is ``on_purpose``: it does not follow.
     """
 
     largest: Floats
     oscillation: Floats
     beyond_reach: Floats
-    excused: NDArray[np.bool_]
+    on_purpose: NDArray[np.bool_]
 
     @property
     def follows(self) -> Floats:
         """1 for each run (runs,) that follows its reference, 0 for the others, nan if unknown."""
         return np.where(np.isnan(self.largest), np.nan, self.largest <= 1.0)
-
-    @property
-    def passes(self) -> Floats:
-        """1 for each run (runs,) that follows its reference or misses it on purpose, 0 for others, nan if unknown."""
-        return np.where(self.excused, 1.0, self.follows)
 
     @property
     def oscillates(self) -> Floats:
@@ -570,8 +570,8 @@ def tracking_excess(
             zeros = np.zeros(none.size)
             return TrackingExcess(np.where(known, excess, np.nan), known_turning, zeros, zeros > 0.0)
         parts = settled_parts(scenario, numbers, least)
-        beyond, is_switched = shortfall(scenario), only_switches(scenario, scenario.law)
-        found = [excess_of_part(part, is_switched, beyond) for part in parts]
+        is_switched = only_switches(scenario, scenario.law)
+        found = [excess_of_part(part, is_switched) for part in parts]
         explained = bool(scenario.beyond_reach) & misses_for_reach(scenario, parts, turning)
     known = np.isfinite(numbers["settled_error"])
     # Without an earlier part its numbers are nan.
@@ -579,10 +579,9 @@ def tracking_excess(
     known_verdict = known & ~(parts[0].is_undecided & (largest <= 1.0))
     # A value that does not move is no oscillation, however far it is from the reference, and a cut wave is none either.
     swings = (np.where((each.standstill > 1.0) | (each.reach > 1.0), 0.0, each.oscillation) for each in found)
-    beyond = np.where(parts[0].ends_on_ramp, 0.0, beyond) + np.zeros(none.size)
     return TrackingExcess(
         largest=np.where(known_verdict, largest, np.nan),
         oscillation=np.where(counted | known, np.fmax.reduce([turning, *swings]), np.nan),
-        beyond_reach=beyond,
-        excused=(beyond > 0.0) & (largest > 1.0) & explained,
+        beyond_reach=parts[0].beyond_reach + np.zeros(none.size),
+        on_purpose=(largest > 1.0) & explained,
     )

@@ -1,12 +1,13 @@
 """Verdict on a run: whether it follows its reference, the cause of a failure, remedies; and remarks beside it."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from ppafo.documents.json_text import plain
 from ppafo.metrics.metric import controlled_in, extent
 from ppafo.metrics.settled import (
     IN_PUSH_OFF,
@@ -23,12 +24,21 @@ from ppafo.parameters.reach import torque_reach
 from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.tracking.case import Case, change_text, level_text
-from ppafo.simulation.tracking.evidence import ON_STOP, Evidence, cuts_wave, evidence_in, stop_of, torque_beyond_reach
+from ppafo.simulation.tracking.evidence import (
+    ON_STOP,
+    Evidence,
+    cuts_wave,
+    evidence_in,
+    stop_of,
+    torque_beyond_reach,
+    torque_peaks,
+)
 from ppafo.simulation.tracking.rule import (
     CRITERION_TEXTS,
     LARGEST_PEAK,
     LARGEST_PEAK_WALK,
     LEAST_PEAK_WALK,
+    ON_PURPOSE,
     REVERSALS,
     SMALLEST_MOVE,
     Criterion,
@@ -43,7 +53,6 @@ from ppafo.simulation.tracking.rule import (
     only_switches,
     part_limits,
     settled_walk,
-    shortfall,
     task_parts,
 )
 from ppafo.units.shown import in_units
@@ -76,10 +85,10 @@ NOTHING_TO_FOLLOW = (OPEN_LOOP, NO_REFERENCE)
 class Tracking:
     """Verdict on a run: whether its controlled quantity follows its reference.
 
-    ``follows`` is None for a run that is not judged, for the ``reason``; it is False, here and in every study, for a
-    run that misses its reference on purpose, too, which ``passes``. ``kind`` is the kind of failure of one that does
-    not follow, else "". ``criterion`` names the ``number`` that decided, with its ``limit``; both are None without it.
-    ``said`` is the sentence on a run that follows or is not judged.
+    ``follows`` is None for a run that is not judged, for the ``reason``; it is False, here and in every study, also for
+    a run that misses its reference because that is beyond reach on purpose. ``kind`` is the kind of failure of a run
+    that does not follow, else "". ``criterion`` names the ``number`` that decided, with its ``limit``; both are None
+    without it. ``said`` is the sentence on a run that follows or is not judged.
 
     Of a run that does not follow, ``found`` is the failure with the number that decided and its limit. ``error`` is
     the RMS error of the judged part, ``wanted`` the wanted change, ``missing`` the mean error and ``moved`` the range
@@ -128,6 +137,11 @@ class Tracking:
     def passes(self) -> bool:
         """True if the run follows its reference, misses it on purpose, or has nothing to follow."""
         return bool(self.follows or self.accepted) or self.reason in NOTHING_TO_FOLLOW
+
+    def json_document(self) -> dict[str, Any]:
+        """Verdict as plain data, with its sentence, and the third state by the name that studies have for it."""
+        numbers = {field.name: plain(getattr(self, field.name)) for field in fields(self)}
+        return {**numbers, ON_PURPOSE: bool(self.accepted), "sentence": self.sentence}
 
     @property
     def sentence(self) -> str:
@@ -271,7 +285,7 @@ def _following(case: Case, _turning: float, _rate: float) -> Tracking:
 
     errors = []
     for each, error, limit in criteria:
-        shown = ("RMS error", "missing peak torque") + (("swing",) if settled.rests else ("largest error",))
+        shown = "RMS error", "missing peak torque", "excess peak torque", "swing" if settled.rests else "largest error"
         if each not in shown:
             continue
         # The limit of on/off valves is several times wider, so the swing is reported beside the error.
@@ -282,8 +296,13 @@ def _following(case: Case, _turning: float, _rate: float) -> Tracking:
             error_text += f", {100.0 * error / settled.wanted_change:.0f} % of the requested change"
         is_limited = limit < _UNLIMITED * settled.wanted_change
         errors.append(f"{each} {error_text}" + (f" ({limit_text} allowed{reason})" if is_limited else ""))
+    overshoot, way = settled.peak - settled.wanted_change, ""
+    if scenario.follows_reference and not case.only_switches and overshoot > LARGEST_SHARE * settled.wanted_change:
+        limit = (LARGEST_PEAK - 1.0) * settled.wanted_change
+        found, allowed = (change_text(controlled.name, each) for each in (overshoot, limit))
+        way = f"; on the way it overshoots by {found} ({allowed} allowed)"
     # The interval stands before the errors: metrics of the same names cover the whole run.
-    said = f"the {controlled.words} follows its reference;{since}: {', '.join(errors)}"
+    said = f"the {controlled.words} follows its reference;{since}: {', '.join(errors)}{way}"
     # A reference just beyond reach is missed by no more than is allowed.
     beyond = torque_beyond_reach(case) if scenario.follows_reference else ""
     return replace(verdict, said="; ".join(filter(None, (said, beyond))))
@@ -294,22 +313,22 @@ def _criteria(case: Case) -> tuple[_Judged, ...]:
     scenario, settled, switches = case.scenario, case.settled, case.only_switches
     mean, wanted, asked = abs(settled.mean_error), settled.wanted_change, settled.requested_peak
     if not scenario.follows_reference:
-        peak: _Judged = ("missing peak torque", asked - settled.given_peak, (1.0 - LEAST_PEAK_WALK) * asked)
+        missing = asked - settled.given_peak
+        peak: _Judged = ("missing peak torque", missing, (1.0 - LEAST_PEAK_WALK) * asked)
+        if missing < 0.0 < asked:
+            peak = ("excess peak torque", -missing, (LARGEST_PEAK_WALK - 1.0) * asked)
         of_request: _Judged = ("RMS error", settled.rms_error, LARGEST_SHARE_OF_WAVE * wanted)
         return (peak,) if settled.start == IN_PUSH_OFF else (of_request, peak)
-    beyond = float(np.max(shortfall(scenario)))
-    is_cut = beyond > mean and not settled.rests
     reach: Criterion = "any reach" if scenario.motion.locked_angle is None else "reach"
     # On a quick ramp an error is allowed that would be none at rest.
     weight = max(float(settled.weight * settled.share), _LEAST)
     rms, of_mean, swing, largest = (float(limit) / weight for limit in part_limits(settled, switches))
-    lacking = ((reach if is_cut else "mean error", beyond if is_cut else mean, LARGEST_SHARE * wanted),)
     return (
         ("RMS error", settled.rms_error, rms),
         ("mean error", mean, of_mean),
         ("swing", settled.error_range, swing),
         ("largest error", settled.largest_error, min(largest, LARGEST_EXCUSED * settled.way)),
-        *(lacking if beyond > 0.0 else ()),
+        *([(reach, settled.beyond_reach, LARGEST_SHARE * wanted)] if settled.beyond_reach > 0.0 else []),
     )
 
 
@@ -362,22 +381,20 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float] | None:
         return Case(scenario, recording, settled, failure), turning, rate
     parts = task_parts(scenario, recording)
     counted = parts[0].command_reversal_rate * per if is_noisy(scenario) else reversals
-    turning, beyond, switches = (
-        counted / most,
-        float(np.max(shortfall(scenario))),
-        only_switches(scenario, scenario.law),
-    )
-    ratios = [excess_of_part(part, switches, beyond) for part in parts]
-    # An earlier part decides where it fails and the last one does not, or fails less.
-    largest = [
-        float(ratios[0].largest),
-        *(np.nan_to_num(float(each.largest)) * (each.largest > 1.0) for each in ratios[1:]),
-    ]
+    turning, switches = counted / most, only_switches(scenario, scenario.law)
+    ratios = [excess_of_part(part, switches) for part in parts]
+    # An earlier part decides where it fails and the last one does not, or fails less. The reach is that of all parts.
+    errors = [float(np.nan_to_num(np.max(each[:-1]))) for each in ratios]
+    largest = [errors[0], *(error * (error > 1.0) for error in errors[1:])]
     place = int(np.argmax(largest))
     excess, settled = ratios[place], parts[place]
     failure = failure_of_task(excess, turning)
-    is_for_reach = bool(misses_for_reach(scenario, parts, turning)[0])
+    is_for_reach = bool(misses_for_reach(scenario, parts, turning))
     case = Case(scenario, recording, settled, failure, is_for_reach)
+    if largest[place] <= 1.0 < excess.reach and max(peak.lacking for peak in torque_peaks(case)) <= 0.0:
+        # Another part asks for it.
+        settled = settled._replace(first=0.0, last=len(recording) - 1.0, start=float(recording.time[0]), end=0.0)
+        case = replace(case, settled=settled)
     # No oscillation: an error at the cut peaks of a wave, which reverses more often than the wave, and a slow approach.
     if failure == "oscillates" and turning <= 1.0 and (cuts_wave(case) or case.is_approaching):
         case = replace(case, failure="does not follow")
