@@ -7,16 +7,19 @@ the catalogue's group; an object of a module named by the user is ``my_module:KI
 for a name that is unknown here.
 """
 
+import dataclasses
 import importlib.util
 import logging
 import sys
+import traceback
 from collections.abc import Callable, Iterator, Mapping, MutableMapping
-from functools import lru_cache
+from functools import lru_cache, partial
+from types import CodeType, FunctionType
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from ppafo.errors import KindError
+from ppafo.errors import KindError, PpafoError, noted_in
 from ppafo.plugins import OBJECT, is_working_folder, named_kinds, object_of, without_working_folder
-from ppafo.wording import one_line
+from ppafo.wording import one_line, place
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -25,6 +28,9 @@ logger = logging.getLogger("ppafo")
 
 Kind = TypeVar("Kind")
 """Entry of a catalogue: component with a ``name``, or function of another package."""
+_CHECK = "ppafo.engine.trials:check_kind"
+"""Check of a component of another package, imported with the first of them."""
+_CATALOGUES: list["Kinds[Any]"] = []
 
 
 class Kinds(MutableMapping[str, Kind], Generic[Kind]):
@@ -50,6 +56,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         }
         for name in self._absent:
             del self._own[name], self._places[name]
+        _CATALOGUES.append(self)
 
     def __getitem__(self, name: str) -> Kind:
         """Return a component by name. Raises KeyError for an unknown name, KindError for an unusable component."""
@@ -96,19 +103,21 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         # A module may be named in two ways, and its components are loaded once.
         loaded = {getattr(kind, "name", name) for name, kind in self._kinds.items()}
         named = named_kinds(self._kind_type) if self._of_modules else ()
-        self._kinds |= {word: kind for word, kind in named if kind.name not in loaded}
-        problems = []
+        wrong = list[PpafoError]()
+        for word, kind in named:
+            if kind.name not in loaded:
+                with noted_in(wrong):
+                    self._kinds[word] = self._checked(partial(object_of, word), f"{self.word} '{one_line(word)}'", "")
         for point in _entry_points(self.group, _installed_path()):
-            try:
+            with noted_in(wrong):
                 if point.name in self._own:
                     name = f"{self.word} '{one_line(point.name)}' of {_package(point)}"
                     raise KindError(f"{name}: ppafo already has a kind with this name; rename the kind in its package")
                 if point.name not in self._kinds:
                     self._kinds[point.name] = self._load(point)
-            except KindError as error:
-                logger.warning("ppafo: %s", error)
-                problems.append(str(error))
-        return tuple(problems)
+        for error in wrong:
+            logger.warning("ppafo: %s", error)
+        return tuple(map(str, wrong))
 
     def _find(self, name: str) -> Kind | None:
         if not name:
@@ -137,9 +146,11 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         return self._checked(load, f"{self.word} '{one_line(point.name)}' of {_package(point)}", point.name)
 
     def _checked(self, load: Callable[[], Any], where: str, called: str) -> Kind:
-        """Load a component and check its class and its name ``called``. Raises KindError if it is unusable."""
+        """Load a component and check it and its name ``called``. Raises KindError if it is unusable."""
         try:
             kind: Kind = load()
+            if dataclasses.is_dataclass(kind):
+                kind_at(_CHECK)(kind)
         except KindError as error:
             raise KindError(f"{where}: {one_line(error)}") from error
         except (Exception, SystemExit) as error:  # what another package does when it is imported is anybody's guess
@@ -219,3 +230,30 @@ def _entry_points(group: str, path: tuple[str, ...]) -> tuple["EntryPoint", ...]
 def _package(point: "EntryPoint") -> str:
     distribution: Any = point.dist
     return f"'{point.module}'" if distribution is None else f"package '{one_line(distribution.name)}'"
+
+
+def fault_of_user(error: Exception) -> str:
+    """Return a line on the kind of another package behind an error; all that are loaded if it passed no file of one."""
+    kinds = _kinds_by_code()
+    steps = traceback.extract_tb(error.__traceback__)
+    frames = [step for step in steps if step.filename in {code.co_filename for code in kinds}]
+    if not kinds:
+        return ""
+    passed = {frame.name for frame in frames}
+    codes = [code for code in kinds if code.co_name in passed] or list(kinds)
+    functions = [f"{kinds[code]}: {code.co_name}({', '.join(code.co_varnames[: code.co_argcount])})" for code in codes]
+    places = [(code.co_filename, code.co_firstlineno) for code in codes]
+    places += [(frame.filename, frame.lineno or 0) for frame in frames]
+    return f"{place(*places[-1])}: {' or '.join(functions)}: {type(error).__name__}: {error}"
+
+
+def _kinds_by_code() -> dict[CodeType, str]:
+    """Return the kinds of other packages and of the user's modules, as in messages, by the code of their functions."""
+    kinds: dict[CodeType, str] = {}
+    for catalogue in _CATALOGUES:
+        for name, kind in catalogue.loaded().items():
+            for part in () if catalogue.is_own(name) else (kind, getattr(kind, "model", None)):
+                for item in (part, *(getattr(part, field) for field in getattr(part, "__dataclass_fields__", ()))):
+                    if isinstance(item, FunctionType) and not item.__module__.startswith("ppafo."):
+                        kinds[item.__code__] = f"{catalogue.word} '{one_line(name)}'"
+    return kinds

@@ -249,3 +249,13 @@ def override_text(overrides: Iterable[str]) -> str:
     if _reader.get() != "command line":
         return f"overrides={list(overrides)!r}"
     return shlex.join(word for override in overrides for word in ("--set", override))
+
+
+def place(file: str, line: int) -> str:
+    """Return a line as named in messages: by relative path below the working folder, otherwise by file name."""
+    path = Path(file)
+    try:
+        path = path.relative_to(Path.cwd())
+    except (ValueError, OSError):
+        path = Path(path.name)
+    return f"{one_line(path)}:{line}"

@@ -11,7 +11,7 @@ from ppafo.cli.command_line import Command, CommandGroup, CommandParser, UsageEr
 from ppafo.cli.commands import COMMANDS, OTHERS, check_words, list_commands
 from ppafo.cli.output import EXIT_INTERRUPTED
 from ppafo.errors import PpafoError
-from ppafo.kinds import kind_at
+from ppafo.kinds import fault_of_user, kind_at
 from ppafo.version import __version__
 from ppafo.wording import one_line
 
@@ -178,6 +178,11 @@ def _run(words: list[str]) -> int:
             is_long, half = len(line) > _LONGEST_MESSAGE, _LONGEST_MESSAGE // 2
             shown = f"{line[:half]} ... {line[-half:]}" if is_long else line
             print(f"{'  ' if number else 'ppafo: '}{shown}", file=sys.stderr)
+        return EXIT_BAD_INPUT
+    except Exception as error:  # what a kind of another package raises while it runs is anybody's guess
+        if not (line := fault_of_user(error)):
+            raise
+        print(f"ppafo: {one_line(line)}", file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt as interrupt:
         print(f"ppafo: {str(interrupt) or 'interrupted; no file is incomplete'}", file=sys.stderr)

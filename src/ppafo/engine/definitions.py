@@ -10,8 +10,9 @@ from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 from ppafo.engine.entries import PARSING
-from ppafo.engine.plain_python import check_flow, check_grammar, parse_module, place, refusal
+from ppafo.engine.plain_python import check_flow, check_grammar, parse_module, refusal
 from ppafo.errors import ProgramError
+from ppafo.wording import place
 
 Adaptation = Callable[[FunctionType, ast.FunctionDef], ast.FunctionDef]
 """Function that converts the syntax tree of a definition to the compiled subset of Python."""

@@ -3,16 +3,12 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ppafo.engine.in_python import WITHOUT_EXCEPTIONS, Operations, functions_of
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.step import loop
 from ppafo.engine.step.lane import Lane
-
-Floats = NDArray[np.float64]
+from ppafo.signals.recording import Floats
 
 
 class PythonProgram:

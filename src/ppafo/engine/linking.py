@@ -7,7 +7,7 @@ from ppafo.engine.definitions import place_of
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import Replacements
 from ppafo.errors import ProgramError
-from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
+from ppafo.model.effects.kind import Effect, laws_in_order
 from ppafo.model.plant import PlantParameters, net_torque, viscous_torque
 from ppafo.model.ports import exhaust_path, supply_path
 
@@ -49,10 +49,6 @@ def link_program(program: Program, replacements: Replacements) -> None:
 
 def link_effects(effects: Sequence[Effect], replacements: Replacements) -> None:
     """Add the laws of effects at their ports. ProgramError for an effect that cannot act."""
-    for effect in effects:
-        problem = effect_problem(effect)
-        if problem:
-            raise ProgramError(f"effect '{effect.name}': {problem}")
     for port, law in laws_in_order(effects).items():
         # A law and its port name the function that the law calls as its port.
         (replacements.inside if isinstance(port, tuple) else replacements.everywhere)[port] = law

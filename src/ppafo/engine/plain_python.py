@@ -13,30 +13,24 @@ from typing import NamedTuple
 
 from ppafo.engine.entries import ORIGIN, PARSING
 from ppafo.errors import ProgramError
-from ppafo.wording import one_line
+from ppafo.kinds import fault_of_user
+from ppafo.wording import one_line, place
 
 _PLAIN = {
     *(ast.Return, ast.Assign, ast.AugAssign, ast.AnnAssign, ast.For, ast.While, ast.If, ast.Break, ast.Continue),
     *(ast.Pass, ast.Expr, ast.BoolOp, ast.BinOp, ast.UnaryOp, ast.IfExp, ast.Compare, ast.Call, ast.keyword),
     *(ast.Constant, ast.Attribute, ast.Subscript, ast.Name, ast.Tuple, ast.Slice, ast.Starred),
 }
+_PACKAGE = Path(__file__).parents[1]
 _INSTEAD = "a law may use numbers, tuples, NamedTuples, 'math' and other plain functions"
 
 
 def refusal(file: str, where: ast.AST | int, problem: str) -> ProgramError:
     """Return the error for a position in a file: one line that starts with ``my_law.py:12: ``."""
     line = where if isinstance(where, int) else getattr(where, "lineno", 0)
-    return ProgramError(f"{place(file, line)}: {one_line(problem)}")
-
-
-def place(file: str, line: int) -> str:
-    """Return a line as named in messages: by relative path below the working folder, otherwise by file name."""
-    path = Path(file)
-    try:
-        path = path.relative_to(Path.cwd())
-    except (ValueError, OSError):
-        path = Path(path.name)
-    return f"{one_line(path)}:{line}"
+    # A fault in a function of this package comes from what a kind of another package gave it.
+    blamed = fault_of_user(TypeError(problem)) if Path(file).is_relative_to(_PACKAGE) else ""
+    return ProgramError(blamed or f"{place(file, line)}: {one_line(problem)}")
 
 
 def parse_module(text: str, path: str = "<unknown>") -> ast.Module:

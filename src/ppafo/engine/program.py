@@ -8,7 +8,6 @@ from ppafo.control.kind import DEAD_BAND, OPEN_LOOP, ControllerKind, ProfileKind
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.channels import REQUEST, TRACED, TRACED_IN_WALKS
 from ppafo.engine.groups import Groups, Role, given, handed, kept, merged, rows_of
-from ppafo.engine.plain_python import place
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.scheme.actuators import functions_of_actuator
 from ppafo.engine.scheme.motion import FreePart, PartEnd, PartSlide, PrescribedStep, StepControl
@@ -26,6 +25,7 @@ from ppafo.model.ports import exhaust_path, leakage_path, supply_path
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
 from ppafo.signals.meter import LED_SHANK, REQUESTED, WALK, MeterKind, ReferenceSummary
+from ppafo.wording import place
 
 
 @dataclass(frozen=True, slots=True)

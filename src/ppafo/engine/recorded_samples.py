@@ -6,16 +6,13 @@ from itertools import repeat
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.engine.compilers import Effort
 from ppafo.engine.entries import ARRAY, HEADER, INLINE, INT, entry_text
-from ppafo.engine.lanes import current_source
+from ppafo.engine.lanes import Floats, current_source
 from ppafo.engine.loading import compiled
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt, row_expression
 from ppafo.engine.source_text import MadeFrom, SourceCollector
-
-Floats = NDArray[np.float64]
 
 
 class RunningEvaluation(NamedTuple):

@@ -8,15 +8,12 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.control.kind import ProfileKind
 from ppafo.engine.lane_rows import lanes_of
-from ppafo.engine.lanes import Batch, BatchResult, begin_block, join_results
+from ppafo.engine.lanes import Batch, BatchResult, Floats, begin_block, join_results
 from ppafo.engine.rows import group_of, leaf_paths, leaves, of_each, row_numbers
 from ppafo.engine.step.lane import LaneTiming
-
-Floats = NDArray[np.float64]
 
 COMMAND = "result.command"
 """Path of the present command among the states of a program."""

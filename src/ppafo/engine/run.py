@@ -29,7 +29,6 @@ if TYPE_CHECKING:  # for most runs know no leg, no line and no walk
     from ppafo.model.regulator import LineState, SupplyLines
 
 Members = NDArray[np.intp]
-Floats = NDArray[np.float64]
 
 NEVER_FAILED = 1.0e300
 AT_REST = LaneResult(command=0.0, failure_time=NEVER_FAILED, too_many_parts=0.0)

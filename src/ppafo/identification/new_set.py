@@ -79,7 +79,7 @@ def with_estimates(parameter_set: ParameterSet, estimates: Iterable[Estimate], v
         others = other_forms(estimate.path)
         numbers = {path: old for path, old in parameter_set.numbers.items() if path not in others}
         # A pressure that was fitted for both regulators holds for both.
-        links = acting(links_of_set(parameter_set, valve or parameter_set.default_valve), {estimate.path})
+        links = acting(links_of_set(parameter_set, parameter_set.default_valve), {estimate.path})
         numbers |= dict.fromkeys((estimate.path, *(path for path, link in links.items() if link.when)), entry)
         note = f"as {estimate.path} was identified"
         numbers |= {path: Entry(beside, "", "derived", entry.source, note) for path, beside in estimate.beside.items()}

@@ -9,7 +9,7 @@ from ppafo.errors import KindError
 from ppafo.kinds import Kinds
 from ppafo.model.actuators.kind import ActuatorKind
 from ppafo.model.effects import bandwidth, restitution
-from ppafo.model.effects.kind import SECTION, Effect, effect_problem
+from ppafo.model.effects.kind import SECTION, Effect
 from ppafo.model.valves.kind import ValveKind
 from ppafo.wording import one_line
 
@@ -66,13 +66,8 @@ def find_effects(paths: Iterable[str]) -> None:
         name = rest.partition(".")[0]
         if section == SECTION and ":" in name:
             raise KindError(f"effect '{one_line(name)}': an effect is found by its entry point 'ppafo.effects' alone")
-        if section == SECTION and name and name not in EFFECTS.loaded():
-            effect = EFFECTS.get(name)
-            problem = "" if effect is None else effect_problem(effect)
-            # An effect that cannot be used leaves the catalogue, or the next look-up would find it without this check.
-            if problem:
-                del EFFECTS[name]
-                raise KindError(f"effect '{one_line(name)}': {problem}")
+        if section == SECTION:
+            EFFECTS.get(name)
 
 
 def ordered_effects() -> tuple[Effect, ...]:

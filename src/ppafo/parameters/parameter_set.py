@@ -45,8 +45,6 @@ _Origin = Annotated[Origin, Words("origin of the value", allowed=get_args(Origin
 _Source = Annotated[str, Words("source: page, equation, data sheet, recording")]
 _Note = Annotated[str, Words("reason, conflict or remark")]
 SOURCE = "override"
-_OF_NO_DEVICE = ("reported.", "valves.")
-"""Prefixes of the paths of a set that a device with a chosen valve does not have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,7 +263,7 @@ def links_of_set(
     links = {
         path: gauge_link(path, entry.value, entry.unit)
         for path, entry in of_device.items()
-        if not path.startswith(_OF_NO_DEVICE)
+        if not path.startswith(("reported.", "valves."))
     }
     if parameter_set.has_one_chamber:
         # A port between two atmospheres passes nothing, as one that is plugged.

@@ -297,9 +297,9 @@ def claim(
 
     Raises StudyError for results of another study or version, and for too little disk space.
     """
-    for inside in (folder.path / "finished", folder.path / "runs"):
-        if inside.is_symlink():
-            raise StudyError(f"{inside}: is a link, but results stay in one folder; choose another folder")
+    for name in ("finished", "runs"):
+        if (folder.path / name).is_symlink():
+            raise StudyError(f"{folder.path / name}: is a link, but results stay in one folder; choose another folder")
     names, asked, chunks = folder.names(), manifest(study), chunks_of(study)
     if MANIFEST in names:
         before, now = _leaves("", read_manifest(folder)), _leaves("", asked)

@@ -18,7 +18,6 @@ from ppafo.exports.c_library.settings import (
     relations_of_vane,
     rules_of_table,
     settings_of,
-    whole_numbers,
 )
 from ppafo.model.catalog import ordered_effects
 from ppafo.model.declaration import PlainFunction
@@ -130,7 +129,16 @@ def library_of(scenario: Scenario) -> Library:
         checking=partial(check_entry, preparation, checks, settings) if has_rules(preparation) else None,
         defaults=frozenset(map(c_identifier, defaults)),
         links=links,
-        rules=(*rules_of_table(scenario, settings), *whole_numbers(settings), *rules),
+        rules=(
+            *rules_of_table(scenario, settings),
+            # In range, a whole number is exact as an integer.
+            *(
+                (f"settings->{setting.name} == (double)(int64_t)settings->{setting.name}", setting.name)
+                for setting in settings
+                if setting.quantity.whole
+            ),
+            *rules,
+        ),
         joint=device.joint,
         actuator=device.actuator.kind,
     )

@@ -143,12 +143,6 @@ def rules_of_table(scenario: Scenario, settings: Iterable[ExportParameter]) -> t
     )
 
 
-def whole_numbers(settings: Iterable[ExportParameter]) -> tuple[Condition, ...]:
-    """Return the rules of whole numbers, such as the seed of the noise; in range, one is exact as an integer."""
-    names = [setting.name for setting in settings if setting.quantity.whole]
-    return tuple((f"settings->{name} == (double)(int64_t)settings->{name}", name) for name in names)
-
-
 def all_opposite(relation: str, known: Collection[str]) -> str:
     """C condition that every supply is on the opposite side of the atmosphere.
 

@@ -196,10 +196,8 @@ def _out_of_range(columns: ScenarioColumns, path: str) -> Problem:
 
 def _is_in_range(values: Floats, quantity: Quantity) -> NDArray[np.bool_]:
     """Return whether each number of a column is finite and in range, and whole where it must be."""
-    is_good = (
-        np.isfinite(values) & is_within(values, quantity) & (~np.bool_(quantity.whole) | (values == np.floor(values)))
-    )
-    return np.asarray(is_good)
+    is_whole = values == np.floor(values) if quantity.whole else True
+    return np.asarray(np.isfinite(values) & is_within(values, quantity) & is_whole)
 
 
 @dataclass(frozen=True, slots=True)
