@@ -12,9 +12,12 @@ import ppafo
 from ppafo import plugins
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.errors import ScenarioError
+from ppafo.engine.trials import check_kind
+from ppafo.errors import PpafoError, ScenarioError
 from ppafo.loading import with_overrides
 from ppafo.metrics import METRICS
+from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
+from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 
 LAW = """
@@ -130,3 +133,38 @@ def test_profiles_and_metrics_are_found_too(install: Install) -> None:
     assert scenario_from_dict(document).reference.kind == "wave"
     assert "mine" in METRICS
     assert "nothing" not in METRICS
+
+
+PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "extend.md").read_text(encoding="utf-8")
+OWN_LAW = next(block for block in PAGE.split("```python\n") if "ControllerKind(" in block).partition("```")[0]
+MISTAKES = {
+    "one_value": (
+        "return command, HysteresisState(command)",
+        "return command",
+        r":22: update\(.*must return",
+    ),
+    "no_unit": ('Number("N m"', 'Number("Nm/foo"', r":10: HysteresisParameters: 'foo' is not a known unit"),
+    "out_of_range": ("0.2, 0.0, 100.0", "200.0, 0.0, 100.0", ":10: HysteresisParameters: band: .*must rise"),
+    "divides_by_zero": ("    error = ", "    error = 1.0 / 0.0 * ", r":30: update\(.*raises ZeroDivisionError"),
+    "no_function": ("update=update", "update=print", ":10: .*must return .*, as a plain function defined with 'def'"),
+    "fails_later": ("HysteresisState(0.0)", "{}", r":\d+: controller 'fails_later:KIND': update\(.*TypeError"),
+}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_mistake_in_a_law_is_one_line_with_its_file(name: str, install: Install, tmp_path: Path) -> None:
+    right, wrong, said = MISTAKES[name]
+    assert right in OWN_LAW
+    # A law without defaults is not tried when it is loaded.
+    text = OWN_LAW.replace(right, wrong).replace("0.2, 0.0", "None, 0.0" if name == "fails_later" else "0.2, 0.0")
+    (tmp_path / f"{name}.py").write_text(text, encoding="utf-8")
+    texts = [f"controller.kind={name}:KIND", "controller.band=0.2 N m", "run.duration=10 ms"]
+    with pytest.raises(PpafoError, match=rf"{name}\.py{said}"):
+        simulate("torque-task-proportional", texts, plugins=[str(tmp_path / f"{name}.py")])
+
+
+def test_every_kind_of_the_package_passes_the_check_of_others() -> None:
+    for catalogue in (CONTROLLERS, PROFILES, WALKING_CONTROLLERS, VALVES, ACTUATORS, EFFECTS, METRICS):
+        catalogue.load_own()
+        for kind in catalogue.loaded().values():
+            check_kind(kind)

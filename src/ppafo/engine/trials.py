@@ -93,7 +93,7 @@ def _attempt(kind: Any, settings: type) -> None:
             raise ValueError(
                 f"{item.name}: {item.minimum}, {default}, {item.maximum} must rise: minimum, default, maximum"
             )
-        if base_value(1.0, item.unit) != 1.0:
+        if base_value(1.0, str(item.unit)) != 1.0:
             raise ValueError(f"{item.name}: the unit {item.unit!r} is not SI")
     if not is_row(settings) or len(leaf_paths(settings, "")) != len(kind.quantities):
         declaration = "name: Annotated[float, Number(unit, summary, default, minimum, maximum)]"
