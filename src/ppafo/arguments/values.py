@@ -25,8 +25,7 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple, ParamSpec, TypeVar
 
 from ppafo.arguments.reading import ANY, MAXIMUM_DIGITS, NUMBER, NumberRange, NumberWithUnit, Word, task
-from ppafo.errors import ArgumentError, KindError, PpafoError
-from ppafo.kinds import fault_of_user
+from ppafo.errors import ArgumentError, PpafoError
 from ppafo.plugins import name_plugins
 from ppafo.units import SI, carried
 from ppafo.wording import nearest_name, read_by, reader
@@ -70,10 +69,6 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
                 longest = max(Path(str(error.filename)).parts, key=len)
                 given = next((f"{name}: " for name, value in values.items() if longest in str(value)), "")
                 raise ArgumentError(f"{given}{shown(longest)} is too long for the name of a file") from error
-            except Exception as error:  # what a kind of another package raises while it runs is anybody's guess
-                if line := fault_of_user(error):
-                    raise KindError(line) from error
-                raise
 
     return call
 
