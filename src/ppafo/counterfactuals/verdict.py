@@ -101,12 +101,20 @@ def _with_causes(verdict: "Tracking", scenario: Scenario) -> "Tracking":
         if left < _NEARER * excess:
             text += f"; {nearest.words} its error is {left:.3g} times the allowed one, in place of {excess:.3g}"
         return replace(verdict, tried=text)
-    words = [change.words for change in changes[:_CAUSES]]
+    words = [change.words for change in _named(changes)]
     clauses = [text for confirming, text in verdict.evidence if not set(confirming).isdisjoint(words)]
     tried, mended = _remedy(scenario, changes)
     return replace(
         verdict, cause="; ".join((*clauses[:1], f"it follows {', or '.join(words)}")), tried=tried, mended=mended
     )
+
+
+def _named(changes: Sequence[Change]) -> list[Change]:
+    """Return the likeliest causes, at most three; the last one of another part of the scenario, if any is."""
+    first = list(changes[: _CAUSES - 1])
+    groups = {change.group for change in first}
+    rest = sorted(changes[_CAUSES - 1 :], key=lambda change: change.group in groups)
+    return first + rest[:1]
 
 
 def _first_strides(scenario: Scenario) -> Scenario:
