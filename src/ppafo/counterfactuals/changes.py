@@ -177,14 +177,18 @@ def changes_of(scenario: Scenario) -> list[Change]:
         return [*_settings(scenario), *_other_kinds(scenario), *of_device, *of_task]
     bases = [(factor, scenario.controlled_by(ScaledCommand(custom, factor))) for factor in _COMMANDS]
     commands = [Change(_scaled(factor), "law", {}, base, is_of_command=True) for factor, base in bases]
-    # Its runs are slow: of each property a step in the middle that does not take many times as long.
-    longest, steps = _LONGEST_OF_OBJECT * present[_DURATION], dict[str, list[Change]]()
+    # Its runs are slow: of each property the largest step that does not take many times as long.
+    longest, largest = _LONGEST_OF_OBJECT * present[_DURATION], dict[str, Change]()
     for change in (*of_device, *of_task):
         if change.numbers.get(_DURATION, 0.0) <= longest:
-            steps.setdefault(change.words, []).append(change)
-    middle = {words: each[len(each) // 2] for words, each in steps.items()}
-    sizes = [middle[words] for words in (HIGHER_SUPPLY, LARGER_VALVE, SLOWER_REFERENCE) if words in middle]
-    flaws = [each for words, each in middle.items() if "`" in words and each.group in ("sensors", "device")]
+            largest[change.words] = change
+    # The largest valve of all would let any loop swing.
+    valves = [change for change in of_device if change.words == LARGER_VALVE]
+    sizes = [
+        *valves[len(valves) // 2 :][:1],
+        *(largest[each] for each in (HIGHER_SUPPLY, SLOWER_REFERENCE) if each in largest),
+    ]
+    flaws = [each for words, each in largest.items() if "`" in words and each.group in ("sensors", "device")]
     flaws.sort(key=lambda each: each.group != "sensors")
     return [*commands, *flaws[:_FLAWS_OF_OBJECT], *sizes]
 

@@ -16,6 +16,7 @@ from ppafo.metrics.metric import Floats
 from ppafo.model.columns import at
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble import COMPLETED, lacking, run_ensemble
+from ppafo.simulation.ensemble.planning import columns_in_range
 from ppafo.simulation.numbers import declared_numbers, moving_together, present_numbers, with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.rule import most_reversals, needed_metrics, smallest_change, tracking_excess
@@ -74,7 +75,8 @@ def _judged(base: Scenario, rows: Sequence[Mapping[str, float]]) -> list[float]:
 
 def _excess(base: Scenario, metrics: Mapping[str, Floats], columns: Mapping[str, Floats]) -> Floats:
     """Largest tracking number over its limit of each run (runs,), at most 1 for one that misses its task on purpose."""
-    varied = with_numbers(base, {path: column for path, column in columns.items() if path not in TIMES})
+    in_range = columns_in_range(base, columns)
+    varied = with_numbers(base, {path: column for path, column in in_range.items() if path not in TIMES})
     most, duration = most_reversals(base), columns.get("run.duration")
     if duration is not None:
         varied = replace(varied, run=replace(varied.run, duration=duration))  # type: ignore[arg-type]
