@@ -175,8 +175,11 @@ def changes_of(scenario: Scenario) -> list[Change]:
     of_task = list(_easier_tasks(scenario, present))
     if (custom := scenario.controller.custom) is None:
         return [*_settings(scenario), *_other_kinds(scenario), *of_device, *of_task]
-    bases = [(factor, scenario.controlled_by(ScaledCommand(custom, factor))) for factor in _COMMANDS]
-    commands = [Change(_scaled(factor), "law", {}, base, is_of_command=True) for factor, base in bases]
+    commands = list[Change]()
+    for factor in _COMMANDS:
+        words = f"with {factor:g} times the command" if factor > 0.0 else "with the sign of the command reversed"
+        base = scenario.controlled_by(ScaledCommand(custom, factor))
+        commands.append(Change(words, "law", {}, base, is_of_command=True))
     # Its runs are slow: of each property the largest step that does not take many times as long.
     longest, largest = _LONGEST_OF_OBJECT * present[_DURATION], dict[str, Change]()
     for change in (*of_device, *of_task):
@@ -191,10 +194,6 @@ def changes_of(scenario: Scenario) -> list[Change]:
     flaws = [each for words, each in largest.items() if "`" in words and each.group in ("sensors", "device")]
     flaws.sort(key=lambda each: each.group != "sensors")
     return [*commands, *flaws[:_FLAWS_OF_OBJECT], *sizes]
-
-
-def _scaled(factor: float) -> str:
-    return "with the sign of the command reversed" if factor < 0.0 else f"with {factor:g} times the command"
 
 
 def _ideals(scenario: Scenario, present: Mapping[str, float]) -> Iterator[Change]:
@@ -352,21 +351,13 @@ def _settings(scenario: Scenario) -> Iterator[Change]:
         computed[path] = float(link.number(lambda at: computed[at] if at in computed else number_at(scenario, at)))
     computed |= {f"controller.{name}": 0.0 for name in SLOPE_GAINS if settings.get(name, 0.0) > 0.0}
     present = {path: number_at(scenario, path) for path in computed}
-    differs = {
-        path: default
-        for path, default in computed.items()
-        if abs(present[path] - default) > _SAME * max(abs(default), _LEAST_SETTING)
-    }
+    differs = {path: each for path, each in computed.items() if not math.isclose(present[path], each, rel_tol=_SAME)}
     declared = declared_numbers(scenario)
     for path, default in differs.items():
         stated = f"`{path} = {level_text(declared[path].unit, present[path])}`"
         yield Change(f"{_DEFAULT} in place of {stated}", "law", {path: default}, scenario)
     if len(differs) > 1:
         yield Change(f"{_DEFAULT} settings of the controller", "law", differs, scenario)
-
-
-_LEAST_SETTING = 1.0e-12
-"""Setting below which a default is 0 [SI]."""
 
 
 def _other_kinds(scenario: Scenario) -> Iterator[Change]:

@@ -9,16 +9,13 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.control.catalog import CONTROLLERS, switching_remedy
-from ppafo.control.kind import ControllerKind
 from ppafo.control.torque_loop import SAMPLES_LATE
 from ppafo.metrics.metric import Floats, controlled_in, followed
 from ppafo.metrics.settled import LARGEST_SHARE
 from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.plant import gravity_torque
-from ppafo.parameters.device import Device
 from ppafo.parameters.graph import PRESSURE_PATH, Asked
 from ppafo.parameters.reach import static_torque, supply_that_moves, torque_reach
 from ppafo.simulation.gains import loop_of
@@ -250,31 +247,19 @@ def _step_of_valves(case: Case) -> str:
         law = CONTROLLERS["on_off"]
     if law is None or not (case.only_switches or case.law is None):
         return ""
-    step, dead_time = _pair_step(case, law)
+    # Step R theta at the mean angle, in the dead time theta.
+    loop, angle = loop_of(scenario, law), float(np.mean(case.channel("angle")))
+    parts = LoopParts(scenario.device, scenario.motion.motion_kind.sees(scenario), scenario.controlled)
+    step = loop.rate * loop.dead_time * quicker_at(parts, Asked(lambda path: number_at(scenario, path)), angle)
     ratio = step / case.settled.wanted_change
     if ratio <= _FINE:
         return ""
     controlled = scenario.controlled if TORQUE in law.controls else TORQUE
     declare = switching_remedy(scenario.controller.kind)
     asks = f"`{law.name}` requests partial openings, which on/off valves do not have{declare}: "
-    in_time = f"in their dead time of {1.0e3 * dead_time:.3g} ms, {ratio:.2g} times the requested change"
+    in_time = f"in their dead time of {1.0e3 * loop.dead_time:.3g} ms, {ratio:.2g} times the requested change"
     partial = asks * (is_pair(scenario) and not law.only_switches)
     return f"{partial}the valves cause a step of {change_text(controlled, step)} {in_time}"
-
-
-def _pair_step(case: Case, law: ControllerKind) -> tuple[float, float]:
-    """Step R theta of on/off valves [SI] at the mean angle of the settled part, in their dead time theta [s]."""
-    scenario, loop, angle = case.scenario, loop_of(case.scenario, law), float(np.mean(case.channel("angle")))
-    parts = LoopParts(scenario.device, scenario.motion.motion_kind.sees(scenario), scenario.controlled)
-    quicker = quicker_at(parts, Asked(lambda path: number_at(scenario, path)), angle)
-    return loop.rate * loop.dead_time * quicker, loop.dead_time
-
-
-def _reach_at_samples(device: Device, angle: Floats) -> tuple[NDArray[np.intp], Floats]:
-    """Up to 400 indices of angles (samples,), and the lowest and highest static torque there, (indices, 2) [N m]."""
-    torque = static_torque(device)
-    chosen = np.unique(np.linspace(0, angle.size - 1, _SAMPLES).astype(np.intp))
-    return chosen, np.array([torque_reach(device, float(angle[index]), torque) for index in chosen])
 
 
 def _request_beyond_reach(case: Case) -> str:
@@ -282,7 +267,9 @@ def _request_beyond_reach(case: Case) -> str:
     settled = case.settled
     if case.overshoots or controlled_in(case.recording) is None:
         return ""
-    places, reaches = _reach_at_samples(case.device, case.channel("angle"))
+    angle, torque = case.channel("angle"), static_torque(case.device)
+    places = np.unique(np.linspace(0, angle.size - 1, _SAMPLES).astype(np.intp))
+    reaches = np.array([torque_reach(case.device, float(angle[place]), torque) for place in places])
     reference = case.reference[places]
     above, below = reference - reaches[:, 1], reaches[:, 0] - reference
     share = float(np.mean((above > 0.0) | (below > 0.0)))
