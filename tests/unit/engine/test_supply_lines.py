@@ -11,10 +11,12 @@ from ppafo.control.profiles import CONSTANT
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.program import Program
 from ppafo.engine.run import Run, batch_of, state_row_numbers
+from ppafo.engine.scheme.actuators import filled_state
 from ppafo.engine.scheme.pneumatics import SlopedFlows, gas_flows
 from ppafo.engine.step import gas as gas_of_step
 from ppafo.engine.step import lines as lines_of_step
 from ppafo.engine.step.lane import Lane
+from ppafo.model.catalog import ACTUATORS
 from ppafo.model.orifice import orifice_flow
 from ppafo.model.plant import (
     PlantParameters,
@@ -28,7 +30,7 @@ from ppafo.model.regulator import LineState, SupplyLines, line_pressures, lines_
 from ppafo.model.valves.proportional import IDEAL
 from ppafo.parameters import load_device
 from ppafo.parameters.plant import plant_parameters
-from ppafo.simulation.plan import plan_run, state_with_volumes
+from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import RegulatedLine, SupplyLine
 from ppafo.walking import load_walk
 from ppafo.walking.motion import with_duration
@@ -43,6 +45,12 @@ def device(dorsiflexion: float = 0.7) -> PlantParameters:
     """The paper's device; dorsiflexion has its own, lower pressure."""
     plant = plant_parameters(load_device("ppafo2011"))
     return plant._replace(dorsiflexion_pressure=dorsiflexion * plant.supply_pressure, relieving=1.0)
+
+
+def vented(plant: PlantParameters) -> PlantState:
+    """Both chambers at the atmosphere, the vane at rest."""
+    room = plant.atmospheric_pressure
+    return filled_state(ACTUATORS["vane"].model, plant, ANGLE, 0.0, room, room)
 
 
 class Filled(NamedTuple):
@@ -75,9 +83,7 @@ def end_step(parts: Program, lane: Lane, ports: tuple[SinglePort, SinglePort], s
 def filled(plant: PlantParameters, lines: SupplyLines, step: float) -> Filled:
     """Both chambers filled at once from full lines, the vane held."""
     state, gas = (
-        state_with_volumes(
-            plant, ANGLE, 0.0, *chamber_volumes(plant, ANGLE), plant.atmospheric_pressure, plant.atmospheric_pressure
-        ),
+        vented(plant),
         lines_at_start(plant, lines),
     )
     parts = Program(IDEAL, CONSTANT, None, CONSTANT, True, False, feed=lines_of_step)
@@ -117,9 +123,7 @@ def solved(dorsiflexion: float, lines: SupplyLines) -> tuple[float, ...]:
         return [fed_1 - leak, fed_2 + leak, bottle - second - fed_1, second - fed_2, bottle]
 
     begin, gas = (
-        state_with_volumes(
-            plant, ANGLE, 0.0, *chamber_volumes(plant, ANGLE), plant.atmospheric_pressure, plant.atmospheric_pressure
-        ),
+        vented(plant),
         lines_at_start(plant, lines),
     )
     start = [begin.mass_1, begin.mass_2, gas.mass_1, gas.mass_2, 0.0]
@@ -155,9 +159,7 @@ def test_what_came_through_is_in_lines_and_chambers(step: float) -> None:
     made, full, begin = (
         filled(plant, LINES, step),
         lines_at_start(plant, LINES),
-        state_with_volumes(
-            plant, ANGLE, 0.0, *chamber_volumes(plant, ANGLE), plant.atmospheric_pressure, plant.atmospheric_pressure
-        ),
+        vented(plant),
     )
     gained = made.state.mass_1 - begin.mass_1 + made.state.mass_2 - begin.mass_2
     gained += made.lines.mass_1 - full.mass_1 + made.lines.mass_2 - full.mass_2
@@ -167,9 +169,8 @@ def test_what_came_through_is_in_lines_and_chambers(step: float) -> None:
 
 def test_without_droop_and_limit_a_filling_is_that_of_a_constant_supply() -> None:
     plant, step, parts, lane = device(), 2.5e-4, Program(IDEAL, CONSTANT, None, None, True, False), Lane()
-    room = plant.atmospheric_pressure
     lane.plant, ports = plant, open_ports(plant)
-    lane.state = state_with_volumes(plant, ANGLE, 0.0, *chamber_volumes(plant, ANGLE), room, room)
+    lane.state = vented(plant)
     for _ in range(round(DURATION / step)):
         lane.flowing = flowing_now(plant, lane.state, ports)
         gas_of_step.begin(parts, lane, ANGLE, step)
