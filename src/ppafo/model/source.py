@@ -257,11 +257,6 @@ def regulated_pressure(regulator: Regulator, mass_flow: float) -> float:
     return regulator.set_pressure - regulator.droop * mass_flow
 
 
-def delivered_pressure(regulator: Regulator, bottle_pressure: float, mass_flow: float) -> float:
-    """Absolute pressure [Pa] downstream of a regulator: regulated, or bottle pressure minus margin if that is lower."""
-    return min(regulated_pressure(regulator, mass_flow), bottle_pressure - regulator.pressure_margin)
-
-
 def pressure_reserve(regulator: Regulator, bottle_pressure: float, mass_flow: float) -> float:
     """Bottle pressure minus the required inlet pressure of the regulator at a flow [kg/s], in [Pa]."""
     return bottle_pressure - regulator.pressure_margin - regulated_pressure(regulator, mass_flow)

@@ -13,7 +13,6 @@ from ppafo.model.source import (
     bottle_rates,
     content_energy,
     content_temperature,
-    delivered_pressure,
     densest_gas,
     fluid_pressure,
     liquid_density,
@@ -81,8 +80,6 @@ def test_rates_balance_mass_and_energy_of_content_and_wall() -> None:
 def test_a_regulator_droops_with_the_flow_and_follows_the_bottle_when_that_is_too_low() -> None:
     assert regulated_pressure(REGULATOR, 0.0) == 4.5e5
     assert regulated_pressure(REGULATOR, 5e-3) == pytest.approx(4.35e5)
-    assert delivered_pressure(REGULATOR, 6e6, 5e-3) == pytest.approx(4.35e5)
-    assert delivered_pressure(REGULATOR, 5e5, 5e-3) == pytest.approx(4e5)
     assert pressure_reserve(REGULATOR, 6e6, 5e-3) > 0.0 > pressure_reserve(REGULATOR, 5e5, 5e-3)
     assert pressure_reserve(REGULATOR, 5.35e5, 5e-3) == pytest.approx(0.0, abs=1e-6)
 
