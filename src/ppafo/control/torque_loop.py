@@ -16,7 +16,7 @@ torque, R is the rate of that quantity, and its unit replaces N m.
 
 from typing import NamedTuple
 
-LEAST_TORQUE = 5.0e-4
+LEAST_TORQUE = 1.0e-6
 """Smallest torque change within the dead time [N m] for which gains are computed; smaller ones use the same gains."""
 LEAST_RATE = 1.0e-9
 """Smallest rate of a torque or a pressure that is divided by [SI]."""
@@ -39,12 +39,14 @@ SHARPNESS is a power of two, so that laws in fixed point use the same value.
 class TorqueLoop(NamedTuple):
     """Torque rate R at full opening [N m/s], dead time theta [s], and the largest rate that the flow allows [N m/s].
 
-    A valve that regulates pressures reaches the largest rate with less than its full opening.
+    A valve that regulates pressures reaches the largest rate with less than its full opening. Its set pressure then
+    runs ahead of the chamber, which delays large changes of the torque by ``ahead`` [s].
     """
 
     rate: float
     dead_time: float
     largest_rate: float
+    ahead: float = 0.0
 
 
 def beyond_dead_band(opening: float, dead_band: float) -> float:

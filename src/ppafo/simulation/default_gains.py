@@ -121,7 +121,7 @@ def is_gain(setting: Quantity) -> bool:
 
 def gain_link(parts: LoopParts, law: ControllerKind, rule: PlainFunction) -> Link | None:
     """Return the link of a default gain by its rule, whose arguments are groups; None where one of them is unknown."""
-    names, direct = [name.strip("_") for name in inspect.signature(rule).parameters], tuple[str, ...]()
+    names, direct = list(inspect.signature(rule).parameters), tuple[str, ...]()
     # The reach in an angle is not known: the dead zone of a law of the angle is to be given.
     if ("joint" in names and parts.controls_torque) or ("reach" in names and parts.controlled == ANGLE):
         return None

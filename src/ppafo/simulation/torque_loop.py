@@ -433,7 +433,7 @@ def set_torque_loop(parts: LoopParts, lane: Any, settings: Mapping[str, float]) 
     else:
         quickest = max(per_flow(here, lane.around, by[0], by[1]), per_flow(there, lane.around, by[0], by[1]))
     rate = lane.flow * quickest
-    lane.torque_loop = TorqueLoop(rate, lane.valve_time + lane.late, rate)
+    lane.torque_loop = TorqueLoop(rate, lane.valve_time + lane.late, rate, 0.0)
 
 
 def set_regulated_loop(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:
@@ -441,7 +441,8 @@ def set_regulated_loop(parts: LoopParts, lane: Any, settings: Mapping[str, float
 
     An opening of 1 sets the pressure by p, the pressure per command, beyond the present one. The set pressure and the
     chamber follow with a lag each; of the shorter one a half is added to the longer one tau_1, a half to the dead time
-    (the half rule of Skogestad 2003). The flow limits the rate.
+    (the half rule of Skogestad 2003). The flow limits the rate to R_q. A set pressure that asks for more runs ahead of
+    the chamber and has to come back: by the same rule a delay of tau_1/2, times 1 - R_q/R, the part beyond the flow.
     """
     kind = VALVES[parts.device.valve.kind]
     by = _OF_PRESSURE.get(parts.controlled)
@@ -457,7 +458,10 @@ def set_regulated_loop(parts: LoopParts, lane: Any, settings: Mapping[str, float
     chamber_lag = gain * band / max(largest, LEAST_RATE)
     shorter = 0.5 * min(set_lag, chamber_lag)
     late = lane.valve_time + lane.late + shorter
-    lane.torque_loop = TorqueLoop(gain * pressure / (max(set_lag, chamber_lag) + shorter + late), late, largest)
+    longer = max(set_lag, chamber_lag) + shorter
+    rate = gain * pressure / (longer + late)
+    ahead = 0.5 * longer * max(1.0 - largest / rate, 0.0)
+    lane.torque_loop = TorqueLoop(rate, late, largest, ahead)
 
 
 def set_reach(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:  # noqa: ARG001

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 from ppafo.control.angle_loop import (
@@ -10,11 +11,13 @@ from ppafo.control.angle_loop import (
     angle_damping,
     angle_stiffness,
     bandwidth,
+    inner_gain,
     load_time,
     rate_filter,
     rest_distance,
     slow_loop,
     tolerance,
+    torque_lag,
 )
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.controllers.cascade import CASCADE, CascadeParameters
@@ -83,12 +86,14 @@ JOINT = Joint(
 
 def test_as_quick_as_dead_time_or_torque_rate_allow_and_stiff_against_the_gas() -> None:
     frequency = bandwidth(LOOP, JOINT)
-    assert frequency == pytest.approx(min(1.0 / 0.008, (80.0 / (8.4e-3 * 0.1)) ** (1.0 / 3.0)))
+    assert frequency == pytest.approx(min(1.0 / 0.009, (80.0 / (8.4e-3 * 0.1)) ** (1.0 / 3.0)))
     assert angle_stiffness(LOOP, JOINT) == pytest.approx(8.4e-3 * frequency**2 + 1.0)
-    assert angle_damping(LOOP, JOINT) == pytest.approx(8.4e-3 * min(2.0 * frequency, 0.3 / LOOP.dead_time))
-    assert load_time(LOOP, JOINT) == pytest.approx(2.0 / frequency)
+    assert angle_damping(LOOP, JOINT) == pytest.approx(8.4e-3 * frequency)
+    assert load_time(LOOP, JOINT) == pytest.approx(1.0 / frequency)
     slow_valve = LOOP._replace(dead_time=0.05)
-    assert bandwidth(slow_valve, JOINT) == pytest.approx(1.0 / 0.2)
+    assert bandwidth(slow_valve, JOINT) == pytest.approx(1.0 / 0.225)
+    # A set pressure that runs ahead of the flow delays, too.
+    assert bandwidth(slow_valve._replace(ahead=0.05), JOINT) == pytest.approx(1.0 / 0.45)
 
 
 def test_static_friction_raises_the_stiffness_up_to_a_cap() -> None:
@@ -97,13 +102,13 @@ def test_static_friction_raises_the_stiffness_up_to_a_cap() -> None:
     breaking = angle_stiffness(LOOP, heavy._replace(static_friction=1.5 * plain * JOINT.travel))
     stuck = angle_stiffness(LOOP, heavy._replace(static_friction=1000.0 * plain * JOINT.travel))
     assert breaking == pytest.approx(1.5 * plain)
-    assert stuck == pytest.approx((1.0 / (4.0 * LOOP.dead_time)) ** 2 + 1.0)
+    assert stuck == pytest.approx((1.0 / (4.5 * LOOP.dead_time)) ** 2 + 1.0)
 
 
 def test_a_coarse_sensor_widens_what_counts_as_there_and_as_motion() -> None:
     coarse = JOINT._replace(resolution=math.radians(0.5))
-    assert tolerance(LOOP, JOINT) == pytest.approx(math.radians(0.5))
-    assert tolerance(LOOP, coarse) == pytest.approx(math.radians(1.0))
+    assert tolerance(JOINT) == pytest.approx(math.radians(0.5))
+    assert tolerance(coarse) == pytest.approx(math.radians(1.0))
     assert rest_distance(LOOP, coarse) > coarse.resolution > rest_distance(LOOP, JOINT)
     assert rate_filter(LOOP, coarse) > rate_filter(LOOP, JOINT)
 
@@ -183,3 +188,24 @@ def test_the_second_chamber_has_the_other_sign() -> None:
     for name, kind in CONTROLLED.items():
         assert signs.get(name, lambda sign: sign > 0.0)(kind.sign), name
         assert math.isfinite(kind.size)
+
+
+@pytest.mark.parametrize(
+    ("rate", "inertia", "largest"), [(1.0, 1.0, 3.7), (0.7, 1.0, 6), (1.3, 1.0, 6), (1.0, 1.5, 3), (1.0, 0.7, 40)]
+)
+def test_the_linear_loop_of_default_gains_without_friction_has_margins(
+    rate: float, inertia: float, largest: float
+) -> None:
+    # Dead time and believed inertia are units; a slow reference leaves the bandwidth to the dead time.
+    loop, joint = TorqueLoop(1.0, 1.0, 1.0), JOINT._replace(inertia=1.0, shut_in=0.01, travel=1.0e-3)
+    s = 1.0e-3 + 1j * np.concatenate([[0.0], np.logspace(-4.0, 1.6, 1600)])
+    slow = 1.0 + load_time(loop, joint) * s
+    filtered = s / (1.0 + rate_filter(loop, joint) * s)
+    asked = angle_stiffness(loop, joint) + angle_damping(loop, joint) * filtered + s * filtered / slow
+    asked = asked / (1.0 - 1.0 / (slow * (1.0 + torque_lag(loop) * s)))
+    mass = s * s + joint.shut_in / inertia
+    opened = np.exp(-s) * inner_gain(loop) * rate * (asked / (inertia * s * mass) + s / mass)
+    # Nyquist: no turn about -1, as the open loop has no pole to the right of these points.
+    turns = np.ptp(np.unwrap(np.angle(1.0 + opened))[[0, -1]]) / (2.0 * math.pi)
+    assert turns < 0.25
+    assert np.abs(1.0 / (1.0 + opened[s.imag > 0.01])).max() < largest

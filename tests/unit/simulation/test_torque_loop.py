@@ -127,7 +127,7 @@ def test_late_sensors_are_dead_time_too() -> None:
 
 
 def test_no_flow_leaves_a_gain_that_is_finite() -> None:
-    assert proportional_gain(TorqueLoop(0.0, 1.5e-3, 0.0)) == 1000.0
+    assert proportional_gain(TorqueLoop(0.0, 1.5e-3, 0.0)) == 5.0e5
 
 
 @pytest.mark.parametrize("file", ["torque-task-cylinder.toml", "torque-task-measured-bladder.toml"])

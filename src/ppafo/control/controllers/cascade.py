@@ -73,7 +73,7 @@ class CascadeParameters(NamedTuple):
     torque_lag: Annotated[
         float, Number("s", "believed time constant of the torque loop", None, 1.0e-6, 10.0, follows=torque_lag)
     ]
-    torque_gain: Annotated[float, Number("1/(N m)", "command per torque error", None, 0.0, 1.0e3, follows=inner_gain)]
+    torque_gain: Annotated[float, Number("1/(N m)", "command per torque error", None, 0.0, 1.0e6, follows=inner_gain)]
     tolerance: Annotated[
         float,
         Number("rad", "angle error below which the observed load is not updated", None, 0.0, 1.0, follows=tolerance),

@@ -18,7 +18,7 @@ class DampedGains(NamedTuple):
     """Gain [1/(N m)], damping [s/(N m)], time constant of its filter [s]."""
 
     proportional_gain: Annotated[
-        float, Number("1/(N m)", "command per torque error", None, 0.0, 1.0e3, follows=proportional_gain)
+        float, Number("1/(N m)", "command per torque error", None, 0.0, 1.0e6, follows=proportional_gain)
     ]
     damping: Annotated[float, Number("s/(N m)", "command per rate of the torque, against it", 0.0, 0.0, 1.0e3)]
     damping_filter: Annotated[float, Number("s", "time constant of the filter on the torque's rate", 0.001, 0.0, 10.0)]

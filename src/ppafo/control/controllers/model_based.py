@@ -31,12 +31,12 @@ class NominalChambers(NamedTuple):
     The valve opens for commands beyond ``dead_band`` [-].
     """
 
-    torque_constant: Annotated[float, _believed("torque_constant", "m^3", "K_actuator", 1.0e-9, 1.0)]
-    displacement_per_radian: Annotated[float, _believed("displacement_per_radian", "m^3/rad", "B_vane", 1.0e-9, 1.0)]
+    torque_constant: Annotated[float, _believed("torque_constant", "m^3", "K_actuator", 1.0e-12, 1.0)]
+    displacement_per_radian: Annotated[float, _believed("displacement_per_radian", "m^3/rad", "B_vane", 1.0e-12, 1.0)]
     angle_min: Annotated[float, _believed("angle_min", "rad", "lower stop", -10.0, 10.0)]
     angle_max: Annotated[float, _believed("angle_max", "rad", "upper stop", -10.0, 10.0)]
-    dead_volume_1: Annotated[float, _believed("dead_volume_1", "m^3", "dead volume of chamber 1", 1.0e-9, 1.0)]
-    dead_volume_2: Annotated[float, _believed("dead_volume_2", "m^3", "dead volume of chamber 2", 1.0e-9, 1.0)]
+    dead_volume_1: Annotated[float, _believed("dead_volume_1", "m^3", "dead volume of chamber 1", 1.0e-12, 1.0)]
+    dead_volume_2: Annotated[float, _believed("dead_volume_2", "m^3", "dead volume of chamber 2", 1.0e-12, 1.0)]
     gas_product: Annotated[float, _believed("gas_product", "J/kg", "R T / M", 1.0e3, 1.0e7)]
     valve_conductance: Annotated[
         float, _believed("valve_conductance", "kg/(s Pa)", "Cd A C1 of the valve", 1.0e-15, 1.0)

@@ -15,8 +15,8 @@ from ppafo.model.sensors import Measurement
 class PidGains(NamedTuple):
     """PID gains [1/(N m)], [1/(N m s)], [s/(N m)]; derivative filter time constant [s]; back-calculation gain [1/s]."""
 
-    proportional_gain: Annotated[float, Number("1/(N m)", "k_p", None, 0.0, 1.0e3, follows=proportional_gain)]
-    integral_gain: Annotated[float, Number("1/(N m s)", "k_i", None, 0.0, 1.0e6, follows=integral_gain)]
+    proportional_gain: Annotated[float, Number("1/(N m)", "k_p", None, 0.0, 1.0e6, follows=proportional_gain)]
+    integral_gain: Annotated[float, Number("1/(N m s)", "k_i", None, 0.0, 1.0e9, follows=integral_gain)]
     derivative_gain: Annotated[float, Number("s/(N m)", "k_d", 0.0, 0.0, 1.0e3)]
     derivative_filter: Annotated[
         float, Number("s", "time constant of the derivative filter, 0 for none", 0.0, 0.0, 1.0)
