@@ -236,7 +236,7 @@ class FitRuns:
     def _least_noise(self) -> dict[str, float]:
         """Noise floor by channel [SI], proportional to the channel's largest residual at the start."""
         start = self.residuals_at(self.start)
-        largest = (max(float(np.abs(start[block.rows]).max()) for block in blocks) for blocks in self.channels.values())
+        largest = (max(np.abs(start[block.rows]).max() for block in blocks) for blocks in self.channels.values())
         return {name: _LEAST_NOISE * (size or 1.0) for name, size in zip(self.channels, largest, strict=True)}
 
     def deviations(self, series: Floats) -> tuple[Floats, dict[str, float]]:
@@ -247,7 +247,7 @@ class FitRuns:
         noise, by_channel = np.empty(len(series)), {}
         for channel, blocks in self.channels.items():
             samples = np.concatenate([series[block.rows] for block in blocks])
-            pooled = max(math.sqrt(float(np.square(samples).sum()) / len(samples)), self._least_noise[channel])
+            pooled = max(math.sqrt(np.square(samples).sum() / len(samples)), self._least_noise[channel])
             by_channel[channel] = max(pooled, float(np.min(blocks[0].floor)))
             for block in blocks:
                 noise[block.rows] = np.maximum(pooled, block.floor)
@@ -369,7 +369,7 @@ def _best_along(
     points = np.column_stack([tried, ends[:, 0]])
     found = np.column_stack([runs.residuals_at_points(tried), ahead])
     squares = linear.squares(linear.errors(found), points)
-    best = int(np.argmin(np.where(np.isfinite(squares), squares, np.inf)))
+    best = np.argmin(np.where(np.isfinite(squares), squares, np.inf))
     return (float(squares[best]) if np.isfinite(squares[best]) else np.inf), points[:, best], found[:, best]
 
 
@@ -487,7 +487,7 @@ def wrong_shape(sensor: str, series: Sequence[Floats]) -> Conflict | None:
     if count < 1 or size < 0.5 * sum(values.size for values in series):
         return None
     errors = sum(float(values[1:] @ values[:-1]) for values in series) / size * math.sqrt(count)
-    p = float(norm.sf(errors))
+    p = norm.sf(errors)
     return other_shape(sensor, errors, p) if p < _BY_CHANCE else None
 
 
@@ -521,33 +521,33 @@ def _conflict_of(runs: FitRuns, rows: Floats, point: Floats, free: Flags, freedo
             if parts not in known:
                 known.append(parts)
                 groups.append((name, parts))
-    count_of_tests, found = len(groups) + int((prior > 0.0).sum()), list[Conflict]()
+    count_of_tests, found = len(groups) + (prior > 0.0).sum(), list[Conflict]()
     for name, parts in groups:
         group = np.concatenate([slopes[part] for part in parts])
         pull = group.T @ np.concatenate([errors[part] for part in parts]) + prior * shift
         alone, turned = np.linalg.eigh(root.T @ (group.T @ group + np.diag(prior)) @ root)
         # In other directions the group is nearly all that is known, or says nothing: both differences are 0 over 0.
         tested = (alone > 1.0e-6) & (alone < 1.0 / (1.0 + _PARTING))
-        count = int(tested.sum())
+        count = tested.sum()
         if not count:
             continue
         alone, axes = alone[tested], root @ turned[:, tested]
         along = axes.T @ pull
-        statistic = float(np.sum(np.square(along) / (alone * (1.0 - alone))))
-        p = min(float(fisher.sf(statistic / count, count, freedom)) * count_of_tests, 1.0)
+        statistic = np.sum(np.square(along) / (alone * (1.0 - alone)))
+        p = min(fisher.sf(statistic / count, count, freedom) * count_of_tests, 1.0)
         moved = np.abs(axes @ (along / alone))
         spread = np.sqrt(np.square(axes) @ (1.0 / alone - 1.0))
         # A number of which the group says nothing moves by rounding alone. Along one direction all part as far.
         ratios = np.where(spread > 1.0e-6 * np.sqrt(variance), moved / np.maximum(spread, 1.0e-300), 0.0)
-        most = int(np.argmax(ratios > (1.0 - 1.0e-6) * ratios.max()))
-        number, ratio = numbers[most].name, float(ratios[most])
+        most = np.argmax(ratios > (1.0 - 1.0e-6) * ratios.max())
+        number, ratio = numbers[most].name, ratios[most]
         words = f"{name}, fitted alone, would have other values: {number} by {ratio:.1f} standard errors"
         found.append(Conflict(name, number, ratio, p, words))
     # The stated value of a tolerance is a group of its own: its mean parts from the fit by deviation^2 - C.
     own_variance = 1.0 / np.maximum(prior, 1.0e-300) - variance
     for index in np.flatnonzero((prior > 0.0) & (own_variance >= _PARTING * variance)).tolist():
-        ratio = abs(float(shift[index])) / math.sqrt(float(own_variance[index]))
-        p = min(2.0 * float(student.sf(ratio, freedom)) * count_of_tests, 1.0)
+        ratio = abs(shift[index]) / math.sqrt(own_variance[index])
+        p = min(2.0 * student.sf(ratio, freedom) * count_of_tests, 1.0)
         found.append(_beyond_limit(numbers[index].name, ratio, p))
     # Tolerances of a family are tested together, in directions that the unknowns of the fit do not absorb.
     families = list[Conflict]()
@@ -559,10 +559,10 @@ def _conflict_of(runs: FitRuns, rows: Floats, point: Floats, free: Flags, freedo
         tested = alone > _PARTING
         if len(members) > 1 and tested.any():
             # Stated deviations are known, not estimated: so this is chi-square, not F.
-            p = float(chi2.sf(float(np.sum(np.square(axes.T @ moved)[tested] / alone[tested])), int(tested.sum())))
+            p = chi2.sf(np.sum(np.square(axes.T @ moved)[tested] / alone[tested]), tested.sum())
             ratios = np.abs(moved) / np.sqrt(np.maximum(1.0 - np.square(own).sum(axis=1), _PARTING))
-            most = int(np.argmax(ratios))
-            families.append(_beyond_limit(numbers[members[most]].name, float(ratios[most]), p))
+            most = np.argmax(ratios)
+            families.append(_beyond_limit(numbers[members[most]].name, ratios[most], p))
     # Of families the first one that differs, and only where no group does.
     significant = sorted((item for item in found if item.p < _SIGNIFICANCE), key=lambda item: item.p)
     return next(iter((*significant, *(item for item in families if item.p < _SIGNIFICANCE))), None)
@@ -643,11 +643,11 @@ def fit(
     with np.errstate(invalid="ignore", divide="ignore"):
         ends = [np.where(is_ratio, np.log(end), end) for end in (low, high)]
     # A fixed seed gives the same result for the same recordings.
-    drawn = qmc.Sobol(int(is_sought.sum()), seed=1).random(_OTHER_STARTS).T
+    drawn = qmc.Sobol(is_sought.sum(), seed=1).random(_OTHER_STARTS).T
     drawn = ends[0][:, None] + drawn * (ends[1] - ends[0])[:, None]
     drawn = np.where(is_ratio[:, None], np.exp(np.where(is_ratio[:, None], drawn, 0.0)), drawn)
     # The last column is the fitted point, before it the same without an excess, which may hide its base.
-    points = np.repeat(point[:, None], _OTHER_STARTS + 1 + int(is_excess.any()), axis=1)
+    points = np.repeat(point[:, None], _OTHER_STARTS + 1 + is_excess.any(), axis=1)
     points[is_sought, :_OTHER_STARTS] = drawn
     points[is_excess, :-1] = 0.0
     counts = [(best.sensors[block.channel].deviation, block.rows.stop - block.rows.start) for block in blocks]
@@ -668,8 +668,8 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
     errors, jacobian = linear.rows[:, 0], linear.rows[:, 1:]
     covariance = linear.root @ linear.root.T
     # Effective degrees of freedom: samples less the trace of J C J', to which a prior contributes little.
-    freedom = max(len(errors) - float(np.sum(jacobian * (jacobian @ covariance))), 1.0)
-    low, high = _interval_ends(linear, point, float(student.ppf(0.5 + 0.5 * confidence, freedom)))
+    freedom = max(len(errors) - np.sum(jacobian * (jacobian @ covariance)), 1.0)
+    low, high = _interval_ends(linear, point, student.ppf(0.5 + 0.5 * confidence, freedom))
     # At a bound is what the squares would pull across it.
     slope = errors @ jacobian + np.square(runs.prior) * (point - runs.start)
     near = _AT_BOUND * np.maximum(1.0, np.abs(point))
@@ -778,7 +778,7 @@ def _least_squares(runs: FitRuns, start: Floats) -> tuple[Floats, Linear, Floats
             rows, sizes = list[Indices](), list[Floats]()
             for block in runs.blocks:
                 samples = residuals[block.rows]
-                noise = max(white_noise_of(samples), float(np.min(block.floor)))
+                noise = max(white_noise_of(samples), np.min(block.floor))
                 own = np.flatnonzero(outlying_samples(samples, noise))
                 rows.append(own + block.rows.start)
                 sizes.append(off_neighbours(samples)[own] / max(noise, 1.0e-300))

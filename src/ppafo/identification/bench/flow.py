@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import nnls
 
 from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
@@ -125,12 +126,12 @@ class FlowLaw(bench.BenchLaw):
 
         Raises IdentificationError for an unknown species, and for a flow recorded as one of another gas.
         """
-        if (temperature := self.temperature) is None:
+        limit = context.tolerances.gas_temperature
+        temperature = self.temperature
+        deviation = deviation_of_limit(_THERMOMETER if limit is None else limit)
+        if temperature is None:
             (temperature,) = context.numbers("gas.temperature")
             deviation = context.deviation("gas.temperature", temperature)
-        else:
-            limit = context.tolerances.gas_temperature
-            deviation = deviation_of_limit(_THERMOMETER if limit is None else limit)
         if self.gas is None:
             molar_mass, heat_capacity_ratio = context.numbers("gas.molar_mass", "gas.heat_capacity_ratio")
         elif (species := SPECIES.get(self.gas)) is None:
@@ -179,7 +180,7 @@ def flow_tolerances(
         *gas_tolerances(gas, tolerances),
         *bench.within(tolerances.gain_of("mass_flow"), METER),
         *bench.within(tolerances.gain_of("pressure"), SENSORS),
-        *bench.within(tolerances.zero_of_flow * float(np.abs(flow).max()), ZERO),
+        *bench.within(tolerances.zero_of_flow * np.abs(flow).max(), ZERO),
         *bench.within(tolerances.zero_of_pressure, *(f"zero of {name}" for name in pressures)),
     )
 
@@ -329,7 +330,7 @@ def has_both_regimes(opening: Opening, ratio: Floats, source: RecordingSource) -
 
 def steady_readings(
     sources: Sources, names: tuple[str, str], zero: float, used: Flags
-) -> tuple[dict[str, Floats], Floats, list[str], tuple[str, ...]]:
+) -> tuple[dict[str, Floats], Floats, bench.Names, tuple[str, ...]]:
     """Return pressures [Pa] by name, flow [kg/s] and recording of the possible readings, and remarks on the others.
 
     ``zero`` is the limit of the zero of the meter, as a fraction of its largest reading [-]; ``used`` marks the
@@ -339,8 +340,8 @@ def steady_readings(
     first, second = pressures.values()
     readings.check_no_wrong_reading(sources, "mass_flow", (first, second), used)
     flow, used, remarks = readings.meter_readings(sources, first - second, zero, used)
-    labels = np.array(bench.recordings_of(sources))[used].tolist()
-    return {name: values[used] for name, values in pressures.items()}, flow[used], labels, remarks
+    used_pressures = {name: values[used] for name, values in pressures.items()}
+    return used_pressures, flow[used], bench.recordings_of(sources)[used], remarks
 
 
 def flow_through(at: bench.Values, opening: Opening, pressures: Mapping[str, Floats]) -> Floats:
@@ -354,7 +355,7 @@ def solve_flow(
     opening: Opening,
     pressures: Mapping[str, Floats],
     flow: Floats,
-    groups: Sequence[list[str]],
+    groups: Sequence[ArrayLike],
     tolerances: Tolerances,
     confidence: float,
     ratios: Sequence[float] = CRITICAL_RATIOS[:1],
@@ -367,7 +368,7 @@ def solve_flow(
     """
     first, second = pressures.values()
     units = {ratio: [factor * shape for _, factor, shape in opening.parts(first, second, ratio)] for ratio in ratios}
-    ratio = max(units, key=lambda each: abs(float(units[each][0] @ flow)) / float(np.linalg.norm(units[each][0])))
+    ratio = max(units, key=lambda each: abs(units[each][0] @ flow) / np.linalg.norm(units[each][0]))
     columns = np.stack(units[ratio], axis=1)
     alone = np.linalg.norm(flow) / np.linalg.norm(columns, axis=0)
     starts = (nnls(columns * alone, flow)[0] * alone).tolist()
@@ -375,7 +376,7 @@ def solve_flow(
         *opening.unknowns(starts, alone.tolist(), ratio),
         *flow_tolerances(opening.gas, tolerances, pressures, flow),
         # A gain that differs between small and large flows bends the curve of one opening as a gap beside it does.
-        *(bench.within(tolerances.gain_of("mass_flow") * float(alone[1]), _APPARENT) if opening.law == "both" else ()),
+        *(bench.within(tolerances.gain_of("mass_flow") * alone[1], _APPARENT) if opening.law == "both" else ()),
     )
     return bench.solve(lambda at: flow_through(at, opening, pressures), flow, groups, numbers, confidence)
 
@@ -410,11 +411,11 @@ class OpenValveFlowProblem(FlowLaw):
             commands.append(source.recording["command"] if "command" in source.recording else np.ones(driving.size))
         is_open = np.abs(np.concatenate(commands)) >= _FULLY_OPEN
         fully_open = "readings with the valve fully open (command 1 or -1)"
-        readings.check_enough(sources[0], int(is_open.sum()), _MINIMUM_SAMPLES, fully_open)
+        readings.check_enough(sources[0], is_open.sum(), _MINIMUM_SAMPLES, fully_open)
         upstream, downstream, flow = (pool(sources, name) for name in self.needed)
         is_crossed, remarks = downstream >= upstream, tuple[str, ...]()
         # A log may begin before the gas supply is on: no flow without pressure difference is then no error of a column.
-        is_at_rest = is_open & is_crossed & (np.abs(flow) <= zero * float(np.abs(flow[is_open]).max()))
+        is_at_rest = is_open & is_crossed & (np.abs(flow) <= zero * np.abs(flow[is_open]).max())
         if is_at_rest.sum() > is_open.sum() // _FEW and (is_open & ~is_at_rest).sum() >= _MINIMUM_SAMPLES:
             remarks = (
                 f"left out: {is_at_rest.sum()} of {is_open.sum()} readings without flow and pressure difference",
@@ -440,7 +441,7 @@ class OpenValveFlowProblem(FlowLaw):
         has_both_regimes(opening, ratio, sources[0])
         # The nearer the pressures are to each other, the more their noise affects the computed flow.
         limits = critical_pressure_ratio(gas.heat_capacity_ratio), _NEARLY_EQUAL
-        groups = recorded, [_REGIMES[regime] for regime in np.digitize(ratio, limits).tolist()]
+        groups = recorded, np.array(_REGIMES)[np.digitize(ratio, limits)]
         fitted, model = solve_flow(opening, pressures, flow, groups, context.tolerances, self.confidence)
         scatter = float(np.std(flow - model) / flow.max())
         # Densely, so that the curve has no kinks at the readings; between them the upstream pressure is interpolated.

@@ -69,16 +69,31 @@ _MOVING = 0.03
 """Fraction of the largest speed [-] below which the damping panel omits the noisy acceleration."""
 
 
+_OF_INERTIA = "friction.viscous_damping", "friction.dynamic_torque", ("N m s/rad", "N m"), "", ""
+_OVER_INERTIA = (
+    "free_decay.damping_over_inertia",
+    "free_decay.friction_over_inertia",
+    ("1/s", "rad/s^2"),
+    " over the inertia",
+    "; the inertia is unknown, so only ratios to the inertia are identified",
+)
+"""Paths of damping and friction, their units, and ends of their texts and of the summary, by whether I is known."""
+
+
 class FreeDecay(NamedTuple):
-    """Free decay: times from the start [s], angle [rad], direction (1 or -1), velocity [rad/s] if recorded."""
+    """Free decay: times from the start [s], angle [rad], direction (1 or -1), fitted channels, and its number.
+
+    The channels are the angle and, if recorded, the velocity [rad/s].
+    """
 
     time: Floats
     angle: Floats
     sign: float
-    velocity: Floats | None
+    sensors: dict[str, Floats]
+    number: int
 
 
-def decay_of(source: RecordingSource, start: float | None, end: float | None) -> FreeDecay:
+def decay_of(source: RecordingSource, start: float | None, end: float | None, number: int) -> FreeDecay:
     """Return the decay between two times [s] of a recording; by default it starts at the largest speed.
 
     Raises IdentificationError, with file, sample and remedy, if there are too few samples, if nothing moves, if the
@@ -88,31 +103,31 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
     readings.check_moves(source, _ANGLE)
     part, skipped = readings.timed_part(source, start, end)
     readings.check_enough(source, len(part), _MINIMUM_SAMPLES, "samples from start to end")
-    swept, noise = float(np.ptp(part[_ANGLE])), noise_of(part[_ANGLE])
+    swept = np.ptp(part[_ANGLE])
+    noise = noise_of(part[_ANGLE])
     if swept < _MINIMUM_OVER_NOISE * noise:
         source.refuse(f"no motion: the angle changes by {swept:.3g} rad at a noise of {noise:.3g} rad")
-    # A start that the user gave is after the push.
-    has_start = start is not None
     speeds, _ = smoothed_rates(part.time, part[_ANGLE])
-    fastest = 0 if has_start else int(np.argmax(np.abs(speeds)))
+    # A start that the user gave is after the push, which ends a little after the highest speed of the smoothed signal.
+    fastest = int(np.argmax(np.abs(speeds))) if start is None else 0
+    pushed = smoothing_width(part.time.size) // 2 if start is None else 0
     time, angle = part.time[fastest:], part[_ANGLE][fastest:]
     # Friction alone stops the vane.
-    turn = max(int(np.argmin(angle)), int(np.argmax(angle)))
+    turn = max(np.argmin(angle), np.argmax(angle))
     distance = np.abs(angle - angle[turn])
-    near = max(_NEAR * float(distance.max()), _NOISE_NEAR * noise)
-    away = turn + np.flatnonzero(distance[turn:] > near)
+    near = max(_NEAR * distance.max(), _NOISE_NEAR * noise)
+    away = time[turn:][distance[turn:] > near]
     if away.size:
-        halfway, reached = (time[np.flatnonzero(distance[:turn] > far)[-1]] for far in (0.5 * distance.max(), near))
-        if time[away[0]] - reached < _AT_ONCE * (reached - halfway):
+        halfway, reached = (time[:turn][distance[:turn] > far][-1] for far in (0.5 * distance.max(), near))
+        if away[0] - reached < _AT_ONCE * (reached - halfway):
             source.refuse(
                 f"the vane turns back at {time[turn]:.3g} s without coming to rest, so another torque acts, such as a "
                 "spring, gravity, a stop or a hand"
             )
     sign = 1.0 if speeds[fastest] > 0.0 else -1.0
-    # A push ends a little after the highest speed of the smoothed signal; that much is left out.
-    first = fastest if has_start else fastest + smoothing_width(part.time.size) // 2
-    back = np.flatnonzero(sign * speeds[first:] < -_REVERSAL * np.abs(speeds).max())
-    last = first + int(back[0]) if back.size else part.time.size
+    first = fastest + pushed
+    is_back = sign * speeds[first:] < -_REVERSAL * np.abs(speeds).max()
+    last = first + int(np.argmax(is_back)) if is_back.any() else part.time.size
     until = "samples from the highest speed to the first reversal or end"
     readings.check_enough(source, last - first, _MINIMUM_SAMPLES, until)
     time, angle = part.time[first:last], part[_ANGLE][first:last]
@@ -122,15 +137,16 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
                 f"channel 'angle' stays at {plateau.value:g} rad in {plateau.count} rows, from sample "
                 f"{skipped + first + plateau.first + 1}: saturated, or at a stop"
             )
-    velocity = part[_VELOCITY][first:last] if _VELOCITY in part else None
-    if velocity is not None:
+    sensors = {name: part[name][first:last] for name in (_ANGLE, _VELOCITY) if name in part}
+    if _VELOCITY in sensors:
+        velocity = sensors[_VELOCITY]
         # The angle is compared with the area under the velocity.
-        moved = np.concatenate(([0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time))))
+        moved = np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time))
         deviation = angle - angle.mean()
-        gain = float(deviation @ moved / (deviation @ deviation))
+        gain = deviation @ [0.0, *moved] / (deviation @ deviation)
         if abs(gain - 1.0) > _VELOCITY_MAY_DIFFER:
             source.refuse(f"channel '{_VELOCITY}' is {gain:.3g} times the derivative of 'angle'")
-    return FreeDecay(time - time[0], angle, sign, velocity)
+    return FreeDecay(time - time[0], angle, sign, sensors, number)
 
 
 def smoothed_rates(time: Floats, angle: Floats) -> tuple[Floats, Floats]:
@@ -181,19 +197,19 @@ def fall_to_standstill(speed: float, slowing: Slowing) -> tuple[Floats, Floats, 
     nodes = middle[:, None] + half[:, None] * _NODES
     decelerations = slowing.at(nodes)
     # Without any friction the time would be infinite.
-    decelerations = np.maximum(decelerations, _SLOWEST * float(decelerations.max()) + 1e-300)
-    times, swept = half * ((1.0 / decelerations) @ _WEIGHTS), half * ((nodes / decelerations) @ _WEIGHTS)
-    return np.concatenate(([0.0], np.cumsum(times))), np.concatenate(([0.0], np.cumsum(swept))), speeds
+    decelerations = np.maximum(decelerations, _SLOWEST * decelerations.max() + 1e-300)
+    steps = (half * ((each / decelerations) @ _WEIGHTS) for each in (1.0, nodes))
+    times, swept = (np.concatenate(([0.0], np.cumsum(step))) for step in steps)
+    return times, swept, speeds
 
 
 def course(times: Floats, speed: float, slowing: Slowing) -> tuple[Floats, Floats]:
     """Return swept angle [rad] and speed [rad/s] at times [s] after a start at a speed; 0 from standstill on."""
     from scipy.interpolate import CubicHermiteSpline
 
-    known, swept, speeds = fall_to_standstill(speed, slowing)
-    rising = np.concatenate(([True], np.diff(known) > 0.0))
-    inside = np.minimum(times, known[-1])
-    angle = CubicHermiteSpline(known[rising], swept[rising], speeds[rising])
+    fall = fall_to_standstill(speed, slowing)
+    inside = np.minimum(times, fall[0][-1])
+    angle = CubicHermiteSpline(*np.stack(fall)[:, np.diff(fall[0], prepend=-1.0) > 0.0])
     return np.asarray(angle(inside)), np.asarray(angle.derivative()(inside))
 
 
@@ -230,49 +246,45 @@ class FreeDecayProblem(bench.TimedLaw):
         recordings that determine neither parameter, or times or angles in a wrong unit.
         """
         readings.check_sources(sources, _MINIMUM_SAMPLES)
-        low, high = (context.number(f"actuator.angle_{end}") for end in ("min", "max"))
+        low, high = (context.number(f"actuator.angle_{end}") or 0.0 for end in ("min", "max"))
         for source in sources:
-            step = float(np.median(np.diff(source.recording.time))) if len(source.recording) > 1 else 0.0
-            if step and not _STEPS_OF_DECAY[0] < step < _STEPS_OF_DECAY[1]:
+            step = np.median(np.diff(source.recording.time))
+            if not _STEPS_OF_DECAY[0] < step < _STEPS_OF_DECAY[1]:
                 unit = "ms" if step > 1.0e-3 else "s"
                 source.refuse(f"the times of the samples are {step:.3g} s apart; is the unit of time {unit}?")
-            turned = float(np.ptp(source.recording[_ANGLE]))
-            if low is not None and high is not None and turned > _MOST_OF_STOPS * (high - low) > 0.0:
+            turned = np.ptp(source.recording[_ANGLE])
+            if turned > _MOST_OF_STOPS * (high - low) > 0.0:
                 source.refuse(
                     f"'angle' covers {turned:.4g} rad ({turned / math.tau:.3g} turns), but the stops are "
                     f"{math.degrees(high - low):.4g} deg apart; in degrees, give it the unit deg"
                 )
         static, dynamic = (context.number(f"friction.{kind}_torque") for kind in ("static", "dynamic"))
-        # Near standstill, the friction of a seal is at most the static friction.
-        rise = max(static / dynamic - 1.0, 0.0) if static and dynamic else 1.0
+        # Near standstill, the friction of a seal is at most the static friction; its ln(1 + q) has a uniform prior.
+        most = math.log1p(max(static / dynamic - 1.0, 0.0) if static and dynamic else 1.0)
         # Without an inertia the fitted parameters are parameters divided by the inertia.
-        known, deviation = self.inertia_of(context)
-        inertia = known or 1.0
-        damping, friction = "friction.viscous_damping", "friction.dynamic_torque"
-        units, over = ("N m s/rad", "N m"), ""
-        if not known:
-            damping, friction = "free_decay.damping_over_inertia", "free_decay.friction_over_inertia"
-            units, over = ("1/s", "rad/s^2"), " over the inertia"
+        inertia, deviation = self.inertia_of(context)
+        damping, friction, units, over, unknown = _OF_INERTIA if inertia else _OVER_INERTIA
+        inertia = inertia or 1.0
         sources, remarks = readings.without_wrong_samples(sources, (_ANGLE, _VELOCITY), self.start, self.end)
-        decays = [decay_of(source, self.start, self.end) for source in sources]
-        initial, rates, parts = list[FitNumber](), [], []
-        for number, decay in enumerate(decays, start=1):
+        decays = [decay_of(source, self.start, self.end, number) for number, source in enumerate(sources, start=1)]
+        initial = list[FitNumber]()
+        rates = []
+        parts = []
+        for decay in decays:
             velocity, _ = smoothed_rates(decay.time, decay.angle)
-            speed = max(float(np.abs(velocity[:_FEWEST_SMOOTHED]).max()), _LEAST_SPEED)
-            swept = max(abs(float(decay.angle[-1] - decay.angle[0])), _LEAST_SWEPT)
-            initial.append(bench.sought(_START_ANGLE.format(number), float(decay.angle[0]), scale=swept))
+            speed = max(np.abs(velocity[:_FEWEST_SMOOTHED]).max(), _LEAST_SPEED)
+            moved = np.abs(decay.angle - decay.angle[0])
+            swept = max(moved[-1], _LEAST_SWEPT)
+            initial.append(bench.sought(_START_ANGLE.format(decay.number), decay.angle[0], scale=swept))
             # The sign of the decay has the direction, so that the speed is positive.
-            initial.append(bench.sought(_START_SPEED.format(number), speed, 1e-9 * speed, 10.0 * speed))
+            initial.append(bench.sought(_START_SPEED.format(decay.number), speed, 1e-9 * speed, 10.0 * speed))
             # Half of the rate w_0 / s of damping alone, and of the deceleration w_0^2 / (2 s) of friction alone.
             rates.append((0.5 * speed / swept, 0.25 * speed**2 / swept))
             # A wrong law gives different parameters for fast and for slow motion.
-            moved = np.abs(decay.angle - decay.angle[0])
-            half = int(np.searchsorted(np.maximum.accumulate(moved), 0.5 * float(moved.max())))
-            speeds = [] if decay.velocity is None else [(_VELOCITY, decay.velocity)]
-            parts.append((half, [(_ANGLE, decay.angle), *speeds]))
-        starts = [inertia * float(median) for median in np.median(rates, axis=0)]
-        # The prior of ln(1 + q) is uniform up to ``rise``: its standard deviation is its width over sqrt(12).
-        most, usual = math.log1p(rise), _USUAL_RISE_VELOCITY
+            parts.append((int(np.argmax(moved >= 0.5 * moved.max())), decay.sensors))
+        starts = inertia * np.median(rates, axis=0)
+        # The standard deviation of a uniform prior is its width over sqrt(12).
+        usual = _USUAL_RISE_VELOCITY
         near_rest = (
             FitNumber(_RISE, 0.5 * most, 0.0, 2.0 * most, most, most / math.sqrt(12.0)),
             FitNumber(_RISE_VELOCITY, usual, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY, usual, usual),
@@ -293,23 +305,22 @@ class FreeDecayProblem(bench.TimedLaw):
             return Slowing(damping_rate, deceleration, math.expm1(at.get(_RISE, 0.0)), at.get(_RISE_VELOCITY, 0.0))
 
         def shown(at: bench.Values) -> Floats:
-            slowing, series = slowing_of(at, inertia * (1.0 + at[_INERTIA])), []
-            for number, decay in enumerate(decays, start=1):
-                swept, speed = course(decay.time, at[_START_SPEED.format(number)], slowing)
-                series.append(at[_START_ANGLE.format(number)] + (1.0 + at[_GAIN]) * decay.sign * swept)
-                if decay.velocity is not None:
-                    series.append(decay.sign * speed)
+            slowing = slowing_of(at, inertia * (1.0 + at[_INERTIA]))
+            series = []
+            for decay in decays:
+                swept, speed = course(decay.time, at[_START_SPEED.format(decay.number)], slowing)
+                angle = at[_START_ANGLE.format(decay.number)] + (1.0 + at[_GAIN]) * decay.sign * swept
+                series += [angle, decay.sign * speed][: len(decay.sensors)]
             return np.concatenate(series)
 
         fit, model = bench.solve(shown, measured, groups, variables, self.confidence)
         slowing = slowing_of(fit.by_name, inertia)
         at_rest = sum(
-            float(decay.time[-1]) > fall_to_standstill(fit.by_name[_START_SPEED.format(number)], slowing)[0][-1]
-            for number, decay in enumerate(decays, start=1)
+            decay.time[-1] > fall_to_standstill(fit.by_name[_START_SPEED.format(decay.number)], slowing)[0][-1]
+            for decay in decays
         )
-        used = TIME.text(sum(float(decay.time[-1]) for decay in decays), ".3g")
-        recorded = TIME.text(sum(float(np.ptp(source.recording.time)) for source in sources), ".3g")
-        unknown = "" if known else "; the inertia is unknown, so only ratios to the inertia are identified"
+        used = TIME.text(sum(decay.time[-1] for decay in decays), ".3g")
+        recorded = TIME.text(sum(np.ptp(source.recording.time) for source in sources), ".3g")
         return bench.result_of(
             sources,
             fit,
@@ -322,22 +333,22 @@ class FreeDecayProblem(bench.TimedLaw):
 
 def _panels(decays: Sequence[FreeDecay], model: Floats, slowing: Slowing) -> tuple[Panel, Panel]:
     """Return two panels: angle over time, and acceleration over velocity with the straight line of equation (1)."""
-    angles, rates, place = list[Mark](), list[Mark](), 0
-    measured, fitted, fastest = "measured", "fitted", 0.0
+    angles = list[Mark]()
+    rates = list[Mark]()
+    measured, fitted = "measured", "fitted"
+    fastest = 0.0
     for decay in decays:
-        count = decay.time.size
         angles.append(readings_mark(measured, decay.time, decay.angle))
-        angles.append(curve_mark(fitted, decay.time, model[place : place + count]))
-        place += count if decay.velocity is None else 2 * count
+        angles.append(curve_mark(fitted, decay.time, model[: decay.time.size]))
+        model = model[len(decay.sensors) * decay.time.size :]
         velocity, acceleration = smoothed_rates(decay.time, decay.sign * decay.angle)
-        inner = slice(smoothing_width(count), None, max(1, count // 200))
+        inner = slice(smoothing_width(decay.time.size), None, max(1, decay.time.size // 200))
         moving = velocity[inner] > _MOVING * velocity.max()
         rates.append(readings_mark(measured, velocity[inner][moving], acceleration[inner][moving]))
-        fastest = max(fastest, float(velocity.max()))
+        fastest = max(fastest, velocity.max())
         measured = fitted = ""  # the legend names the first decay only
     speeds = np.linspace(0.0, fastest, 200)
-    straight = slowing._replace(rise=0.0)
-    rates.append(curve_mark("$-\\beta\\omega/I - T_c/I$", speeds, -straight.at(speeds)))
+    rates.append(curve_mark("$-\\beta\\omega/I - T_c/I$", speeds, -slowing._replace(rise=0.0).at(speeds)))
     # A rise within 2 % of the velocities would be drawn as an upright line on the axis.
     if slowing.rise > 0.0 and slowing.rise_velocity > speeds[4]:
         # The formula of the legend is a straight line; what was fitted near rest bends, and has a name of its own.

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.estimate import Identified
@@ -29,6 +30,8 @@ from ppafo.wording import said_missing
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+Names = NDArray[np.str_]
+"""Group of each reading, by name."""
 Values = Mapping[str, float]
 """Values of the fit variables by name [SI]; a missing name means 0."""
 _MEMORY = 2
@@ -72,10 +75,10 @@ class BenchContext:
 
     def numbers(self, *paths: str) -> list[float]:
         """Return the values of parameters [SI]. Raises IdentificationError with every one that the set lacks."""
-        found = {path: number_in_si(with_followers(self.parameter_set), path) for path in paths}
-        if missing := [path for path, value in found.items() if value is None]:
+        values = {path: number_in_si(with_followers(self.parameter_set), path) for path in paths}
+        if missing := [path for path, value in values.items() if value is None]:
             raise IdentificationError(f"{self.label}: {said_missing(missing)} in {self.parameter_set.file}")
-        return [value for value in found.values() if value is not None]
+        return [value for value in values.values() if value is not None]
 
     def deviation(self, path: str, value: float) -> float:
         """Return the standard deviation [SI] of a parameter of given ``value``: from bench, set, or defaults."""
@@ -190,32 +193,33 @@ def sought(
     return replace(number, start=start, low=low, high=high, scale=scale or abs(start) or 1.0, **more)
 
 
-def recordings_of(sources: Sources) -> list[str]:
+def recordings_of(sources: Sources) -> Names:
     """Return for each reading of all recordings the label of its recording, with the file name."""
-    named = [(f"recording {number} ({source.name})", source) for number, source in enumerate(sources, start=1)]
-    return [label for label, source in named for _ in source.recording.time]
+    labels = [f"recording {number} ({source.name})" for number, source in enumerate(sources, start=1)]
+    return np.repeat(labels, [len(source.recording) for source in sources])
 
 
 def halved_readings(
-    sources: Sources, parts: Iterable[tuple[int, Iterable[tuple[str, Floats]]]], names: tuple[str, str]
-) -> tuple[Floats, list[tuple[str, ...]]]:
+    sources: Sources, parts: Iterable[tuple[int, Mapping[str, Floats]]], names: tuple[str, str]
+) -> tuple[Floats, list[Names]]:
     """Return the samples over time of all sources with their groups, of which the last is the ``names`` of its half.
 
-    ``parts`` are, for each source, the first sample of the second half, and the channels with their samples.
+    ``parts`` are, for each source, the first sample of the second half, and the samples by channel.
     """
-    series, labels = list[Floats](), list[tuple[str, ...]]()
+    series = list[Floats]()
+    labels = list[tuple[str, str, str]]()
     for number, (source, (half, channels)) in enumerate(zip(sources, parts, strict=True), start=1):
-        for sensor, values in channels:
+        for sensor, values in channels.items():
             series.append(values)
-            whole = f"recording {number} ({source.name})", sensor
-            labels += [(*whole, names[0])] * half + [(*whole, names[1])] * (values.size - half)
-    return np.concatenate(series), list(zip(*labels, strict=True))
+            halves = np.repeat(names, (half, values.size - half)).tolist()
+            labels += [(f"recording {number} ({source.name})", sensor, name) for name in halves]
+    return np.concatenate(series), [*np.transpose(labels)]
 
 
 def solve(
     law: Callable[[Values], Floats],
     measured: Floats,
-    groups: Sequence[Sequence[str]],
+    groups: Iterable[ArrayLike],
     numbers: Sequence[FitNumber],
     confidence: float,
 ) -> tuple[Fit, Floats]:
@@ -225,19 +229,22 @@ def solve(
     separate estimates of each of them are tested against the common ones. Residuals of sensors whose readings are too
     few for correlated noise are tested for runs in order of the law.
     """
-    names, labels = [number.name for number in numbers], list(zip(*groups, strict=True))
-    # In the order of their first reading, so that the first block is the first recording.
-    ranks = {label: rank for rank, label in enumerate(dict.fromkeys(labels))}
-    # A block of the fit is a slice, so that readings of one label must lie side by side.
-    ranked = np.array([ranks[label] for label in labels])
-    order, counts = np.argsort(ranked, kind="stable"), np.bincount(ranked)
-    ends, sensors = np.cumsum([0, *counts]), np.array([sensor for _, sensor, *_ in labels])
-    of_sensor = {name: measured[sensors == name] for name in dict.fromkeys(sensors.tolist())}
+    names = [number.name for number in numbers]
+    # A block of the fit is a slice, so that readings of one label must lie side by side: labels in the order of their
+    # first reading, so that the first block is the first recording.
+    samples_of = defaultdict[tuple[str, ...], list[int]](list)
+    sensors = defaultdict[str, list[int]](list)
+    for sample, label in enumerate(zip(*(each.tolist() for each in np.broadcast_arrays(*groups)), strict=True)):
+        samples_of[label].append(sample)
+        sensors[label[1]].append(sample)
     # A meter shows six digits at most: residuals below say nothing.
-    least, blocks = 1.0e-6 * float(np.ptp(measured)), []
-    for (recording, sensor, *further), rank in ranks.items():
-        rows = slice(int(ends[rank]), int(ends[rank + 1]))
-        floor = np.maximum(least, rounding_of(measured[order][rows], resolution_of(of_sensor[sensor])))
+    least = 1.0e-6 * np.ptp(measured)
+    order = list[int]()
+    blocks = []
+    for (recording, sensor, *further), samples in samples_of.items():
+        rows = slice(len(order), len(order) + len(samples))
+        order += samples
+        floor = np.maximum(least, rounding_of(measured[samples], resolution_of(measured[sensors[sensor]])))
         blocks.append(ResidualBlock(recording, sensor, rows, floor, groups=tuple(further)))
 
     def at(point: Floats) -> Values:
@@ -246,17 +253,13 @@ def solve(
     def residuals(points: Floats) -> Floats:
         return np.stack([(measured - law(at(point)))[order] for point in points.T], axis=1)
 
-    memory = min(_MEMORY, int(counts.min()) // SAMPLES_PER_COEFFICIENT)
+    memory = min(_MEMORY, min(map(len, samples_of.values())) // SAMPLES_PER_COEFFICIENT)
     fitted = fit(residuals, numbers, blocks, confidence, memory=memory)
     model = law(at(fitted.values))
-    for sensor, values in of_sensor.items():
-        noise = fitted.sensors[sensor]
-        if noise.order or not noise.deviation > _TELLING * float(np.ptp(values)):
+    for sensor, noise in fitted.sensors.items():
+        if noise.order or not noise.deviation > _TELLING * np.ptp(measured[sensors[sensor]]):
             continue
-        series = []
-        for block in (block for block in blocks if block.channel == sensor):
-            samples = order[block.rows]
-            by_law = samples[np.argsort(model[samples], kind="stable")]
-            series.append((measured - model)[by_law] / noise.deviation)
+        by_law = [sorted(samples, key=model.item) for label, samples in samples_of.items() if label[1] == sensor]
+        series = [(measured - model)[samples] / noise.deviation for samples in by_law]
         fitted = replace(fitted, conflict=fitted.conflict or wrong_shape(sensor, series))
     return fitted, model

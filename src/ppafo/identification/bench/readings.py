@@ -7,7 +7,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from ppafo.identification.fit import Flags
+from ppafo.identification.fit import Flags, Indices
 from ppafo.identification.source import RecordingSource, Sources, pool, window
 from ppafo.signals import Recording
 from ppafo.signals.faults import longest_gap, noise_of, outlying_samples, plateaus, resolution_of
@@ -60,10 +60,10 @@ def without_wrong_samples(
                     break
             if not wrong.size:
                 continue
-            first = int(wrong[0])
+            first = wrong[0]
             if wrong.size > most:
-                around = float(np.median(values[max(first - 2, 0) : first + 3]))
-                _refuse_outlier(source, name, inside[wrong].tolist(), float(values[first]), around)
+                around = np.median(values[max(first - 2, 0) : first + 3])
+                _refuse_outlier(source, name, inside[wrong], values[first], around)
             is_right[inside[wrong]] = False
             remarks.append(
                 f"left out: {wrong.size} of {inside.size} samples where '{name}' is an outlier; the "
@@ -99,11 +99,13 @@ def check_not_alone(source: RecordingSource, name: str) -> None:
     magnitude. The check applies to driving quantities, for which there is no other check.
     """
     values = source.recording[name]
+    if values.size <= _FEWEST_ALIKE:
+        return
     order = np.argsort(values)
-    for wrong, others in ((order[-1], order[:-1]), (order[0], order[1:][::-1])):
-        away = abs(float(values[wrong] - values[others[-1]])) if others.size >= _FEWEST_ALIKE else 0.0
-        if away > max(2.0 * float(np.ptp(values[others])), float(np.median(np.abs(values)))):
-            _refuse_outlier(source, name, [int(wrong)], float(values[wrong]), float(values[others[-1]]))
+    for wrong, *others in (order[::-1], order):
+        away = abs(values[wrong] - values[others[0]])
+        if away > max(2.0 * np.ptp(values[others]), np.median(np.abs(values))):
+            _refuse_outlier(source, name, [wrong], values[wrong], values[others[0]])
 
 
 def check_no_wrong_reading(sources: Sources, name: str, drivers: Sequence[Floats], used: Flags) -> None:
@@ -130,16 +132,13 @@ def check_no_wrong_reading(sources: Sources, name: str, drivers: Sequence[Floats
     middle = np.median(around, axis=1)
     away = np.abs(values - middle)
     spread = np.minimum(np.ptp(around[:, 1:], axis=1), np.ptp(around[:, :-1], axis=1))
-    least = max(10.0 * float(np.median(away)), _GROSS_READING * usual_range(values))
+    least = max(10.0 * np.median(away), _GROSS_READING * usual_range(values))
     wrong = np.flatnonzero(away > 3.0 * spread + least)
     if wrong.size:
-        first = int(wrong[np.argmax(away[wrong])])
-        source, before = _recording_with(sources, int(samples[first]))
-        numbers = samples[wrong] - before
-        in_recording = numbers[(numbers >= 0) & (numbers < len(source.recording))]
         # The worst one first, which the message describes.
-        worst_first = sorted(in_recording.tolist(), key=lambda sample: sample != samples[first] - before)
-        _refuse_outlier(source, name, worst_first, float(values[first]), float(middle[first]))
+        worst = wrong[np.argmax(away[wrong])]
+        source, places = _in_recording(sources, samples[[worst, *wrong[wrong != worst]]])
+        _refuse_outlier(source, name, places, values[worst], middle[worst])
 
 
 def meter_readings(
@@ -156,16 +155,15 @@ def meter_readings(
     that count. Raises IdentificationError if more than a tenth are impossible.
     """
     flow = pool(sources, "mass_flow")
-    largest = float(np.abs(flow[used]).max(initial=0.0))
+    unsure = zero * np.abs(flow[used]).max(initial=0.0)
     # A shut valve gives readings of both signs by the zero of the meter.
-    lowest = float(flow[used].min(initial=0.0))
-    has_sign = lowest < -zero * largest
-    against = used & (direction * flow < 0.0) & (np.abs(flow) > (zero * largest if lowest < 0.0 else 0.0))
+    lowest = flow[used].min(initial=0.0)
+    against = used & (direction * flow < 0.0) & (np.abs(flow) > (unsure if lowest < 0.0 else 0.0))
+    wrong = np.flatnonzero(against)
     count = np.count_nonzero(used)
     many = _MOST_IMPOSSIBLE * count
-    if not has_sign and np.count_nonzero(against) > many:
+    if wrong.size > many and lowest >= -unsure:
         return np.where(direction < 0.0, -flow, flow), used, ()
-    wrong = np.flatnonzero(against)
     if wrong.size > many:
         sources[0].refuse(
             f"the flow is opposite to the direction of pressures and command in {wrong.size} of {count} readings: a "
@@ -173,19 +171,20 @@ def meter_readings(
         )
     if not wrong.size:
         return flow, used, ()
-    source, before = _recording_with(sources, int(wrong[0]))
+    source, places = _in_recording(sources, wrong)
     remark = (
         f"left out: {wrong.size} of {count} readings with flow against the pressures and the "
-        f"command; the first is sample {int(wrong[0]) - before + 1} of {source.name}"
+        f"command; the first is sample {places[0] + 1} of {source.name}"
     )
     return flow, used & ~against, (remark,)
 
 
-def _recording_with(sources: Sources, sample: int) -> tuple[RecordingSource, int]:
-    """Return the recording that contains a pooled sample, and the number of samples before that recording."""
+def _in_recording(sources: Sources, samples: Indices) -> tuple[RecordingSource, Indices]:
+    """Return the recording that contains the first of some pooled samples, and the numbers in it of those it has."""
     ends = np.cumsum([len(source.recording) for source in sources])
-    index = int(np.searchsorted(ends, sample, side="right"))
-    return sources[index], int(ends[index]) - len(sources[index].recording)
+    index = np.searchsorted(ends, samples, side="right")
+    source = sources[index[0]]
+    return source, samples[index == index[0]] - ends[index[0]] + len(source.recording)
 
 
 def usual_range(values: Floats) -> float:
@@ -193,9 +192,12 @@ def usual_range(values: Floats) -> float:
     return float(np.subtract(*np.quantile(values, (0.95, 0.05))))
 
 
-def _refuse_outlier(source: RecordingSource, name: str, samples: list[int], value: float, around: float) -> NoReturn:
+def _refuse_outlier(
+    source: RecordingSource, name: str, samples: Sequence[int] | Indices, value: float, around: float
+) -> NoReturn:
     """Raise IdentificationError for outliers of a channel: the first one with its value, the others by number."""
-    others = f", and so are samples {', '.join(str(sample + 1) for sample in samples[1:4])}" if samples[1:] else ""
+    numbers = ", ".join(str(sample + 1) for sample in samples[1:4])
+    others = f", and so are samples {numbers}" if numbers else ""
     source.refuse(
         f"'{name}' is {source.shown(name, value)} at sample {samples[0] + 1}, but "
         f"{source.shown(name, around)} around it: a wrong reading{others}"
@@ -210,7 +212,7 @@ def check_sources(sources: Sources, fewest: int, moving: Iterable[str] = (), abs
     for source in sources:
         recording = source.recording
         for name, values in (("time", recording.time), *((name, recording[name]) for name in recording.names)):
-            worst = int(np.argmax(np.abs(values)))
+            worst = np.argmax(np.abs(values))
             if abs(values[worst]) > _LARGEST_NUMBER:
                 source.refuse(f"'{name}' is {values[worst]:g} at sample {worst + 1}: impossible")
         check_enough(source, len(recording), fewest, "samples")
@@ -218,7 +220,7 @@ def check_sources(sources: Sources, fewest: int, moving: Iterable[str] = (), abs
             check_moves(source, name)
         for name in absolute:
             # Gauge pressures, passed for absolute, are 0 or less where the other side is open.
-            low = int(np.argmin(recording[name]))
+            low = np.argmin(recording[name])
             if recording[name][low] <= 0.0:
                 source.refuse(
                     f"'{name}' is {source.shown(name, recording[name][low])} at sample {low + 1}, which is impossible "
@@ -251,7 +253,7 @@ def check_not_clipped(
     values = source.recording[name]
     longest, _ = plateaus(values)
     # A reading that stays where nothing moves is right.
-    moves = float(np.ptp(driving[longest.first : longest.last + 1])) > fraction * float(np.abs(driving).max())
+    moves = np.ptp(driving[longest.first : longest.last + 1]) > fraction * np.abs(driving).max()
     if moves and longest.count >= max(_FEWEST_CLIPPED, _SHARE_THAT_IS_CLIPPED * values.size):
         source.refuse(
             f"channel '{name}' stays at {source.shown(name, values.max())} for {longest.count} samples, up to sample "
@@ -266,10 +268,9 @@ def timed_part(source: RecordingSource, start: float | None, end: float | None) 
     """
     part = window(source.recording, start, end)
     skipped = int(np.searchsorted(source.recording.time, part.time[0]))
-    if (gap := longest_gap(part.time)) is not None:
-        index, duration = gap
+    if gap := longest_gap(part.time):
         source.refuse(
-            f"gap of {duration:.4g} s after {part.time[index]:.6g} s (sample {skipped + index + 1}), between start and "
+            f"gap of {gap[1]:.4g} s after {part.time[gap[0]]:.6g} s (sample {skipped + gap[0] + 1}), between start and "
             "end"
         )
     return part, skipped

@@ -19,7 +19,7 @@ import numpy as np
 
 from ppafo.identification.bench import law as bench
 from ppafo.identification.bench import readings
-from ppafo.identification.estimate import in_shown_unit
+from ppafo.identification.estimate import shown_text
 from ppafo.identification.fit import Flags
 from ppafo.identification.source import RecordingSource, Sources, pool, together
 from ppafo.report.kind import Kind
@@ -43,8 +43,12 @@ _MOVES_WITH_DIRECTION = 0.5
 """Least change of a channel per sweep, as a fraction of its range [-], for motion with the direction."""
 _MOST_REPETITIONS = 12
 """Largest number of repetitions tested separately; with more, whole recordings are tested."""
-_ZERO, _GAIN = "static_torque.zero_offset", "gain of the pressure sensor"
-"""Path of the zero error of the scale, which is no parameter of a set, and name of a tolerance."""
+_PATHS = "actuator.torque_constant", "friction.{}_torque", "effects.seal_friction.{}_per_pressure"
+"""Paths of torque constant, friction and its growth in a set, where the load is a torque."""
+_FRICTION_PER_PRESSURE, _ZERO = "static_torque.friction_per_pressure", "static_torque.zero_offset"
+"""Paths of the growth of a friction force and of the zero error of the scale, which are no parameters of a set."""
+_ZERO_OF_PRESSURE, _GAIN = "zero of the pressure sensor", "gain of the pressure sensor"
+"""Names of tolerances."""
 _SIGMAS = 4.0
 """Standard errors below zero from which a negative friction guess means a wrong sign instead of noise."""
 
@@ -67,25 +71,27 @@ class StaticTorqueProblem(bench.BenchLaw):
 
         For a force the units are m^2 and N. Raises IdentificationError for recordings that cannot separate them.
         """
-        tolerances, names = context.tolerances, [source.name for source in sources]
-        is_force = bool(sources) and all(FORCE in item.recording and TORQUE not in item.recording for item in sources)
+        tolerances = context.tolerances
+        has_several = len(sources) > 1
+        is_force = all(FORCE in item.recording and TORQUE not in item.recording for item in sources)
         channel = FORCE if is_force else TORQUE
         is_used = _used_readings(sources, channel, tolerances.zero_of_pressure)
         pressure, load, branch = (pool(sources, name)[is_used] for name in (_PRESSURE, channel, "direction"))
-        # A repetition of a recording is one cluster; so is a recording without repetitions.
         recordings = [source.recording for source in sources]
         files = np.repeat(np.arange(len(sources)), [len(recording) for recording in recordings])[is_used]
+        # A repetition of a recording is one cluster; so is a recording without repetitions.
         strokes = [item["repetition"] if "repetition" in item else np.zeros(len(item)) for item in recordings]
         pairs = np.stack([files, np.concatenate(strokes)[is_used]])
         clusters = np.unique(pairs, axis=1, return_inverse=True)[1].reshape(-1)
-        repetitions = int(clusters.max()) + 1
-        labels = np.array([f"repetition {number + 1}" for number in clusters.tolist()])
+        repetitions = clusters.max() + 1
         # Each group is one more test: of very many none would be significant.
-        if repetitions > _MOST_REPETITIONS:
-            labels = np.array(bench.recordings_of(sources))[is_used]
+        labels = bench.recordings_of(sources)[is_used]
+        if repetitions <= _MOST_REPETITIONS:
+            labels = np.array([f"repetition {number + 1}" for number in clusters.tolist()])
         # Friction varies with position within a stroke, so that consecutive samples of a branch and a repetition at one
         # pressure are no independent readings of the law.
-        widest, first = np.ptp(pressure) / _BINS / 2.0, [0]
+        widest = np.ptp(pressure) / _BINS / 2.0
+        first = [0]
         is_new = (np.diff(np.stack([branch, clusters])) != 0.0).any(axis=0)
         for sample in range(1, pressure.size):
             if is_new[sample - 1] or abs(pressure[sample] - pressure[first[-1]]) > widest:
@@ -101,35 +107,33 @@ class StaticTorqueProblem(bench.BenchLaw):
         # An actuator that slides has kinetic friction. A set has no entry for a force or an area.
         slides = _slides(sources)
         key, grip = ("dynamic", "friction in motion") if slides else ("static", "static friction")
-        unit, noun, slope_unit = ("N", "Area", "m^2") if is_force else ("N m", "Torque constant", "m^3")
-        slope_path, friction_path, growth_path = (
-            ("static_torque.area", f"static_torque.{key}_friction", "static_torque.friction_per_pressure")
+        unit, noun, slope_unit, slope_path, friction_path, growth_path = (
+            ("N", "Area", "m^2", "static_torque.area", f"static_torque.{key}_friction", _FRICTION_PER_PRESSURE)
             if is_force
-            else ("actuator.torque_constant", f"friction.{key}_torque", f"effects.seal_friction.{key}_per_pressure")
+            else ("N m", "Torque constant", "m^3", *(path.format(key) for path in _PATHS))
         )
         load_gain = f"gain of the {channel} sensor"
-        frictions = [f"friction of {name}" for name in names] if len(names) > 1 else []
-        zeros = ["zero of the pressure sensor"]
-        if "zero" in tolerances.each_recording and len(names) > 1:
-            zeros = [f"{zeros[0]} of {name}" for name in names]
+        frictions = [f"friction of {source.name}" for source in sources]
+        is_own_zero = has_several and "zero" in tolerances.each_recording
+        zeros = [f"{_ZERO_OF_PRESSURE} of {source.name}" if is_own_zero else _ZERO_OF_PRESSURE for source in sources]
         of_friction = f"{grip.capitalize()} without a pressure difference"
         of_growth = f"Growth of the {grip} with the pressure difference"
-        per_pressure, size = scale / float(np.abs(pressure).max()), float(np.ptp(load))
+        per_pressure = scale / np.abs(pressure).max()
+        size = float(np.ptp(load))
         numbers = (
             bench.sought(slope_path, slope, unit=slope_unit, text=f"{noun}, the common slope of both branches"),
             bench.sought(friction_path, friction, scale=scale, unit=unit, text=of_friction),
             bench.sought(growth_path, 0.0, scale=per_pressure, unit=f"{unit}/Pa", text=of_growth),
             # A zero of the scale may be an answer.
             bench.sought(_ZERO, zero, scale=scale, unit=unit, text=f"Zero of the {channel} sensor", size=size),
-            *bench.within(tolerances.zero_of_pressure, *zeros),
+            *bench.within(tolerances.zero_of_pressure, *dict.fromkeys(zeros)),
             *bench.within(tolerances.gain_of("pressure"), _GAIN),
             *bench.within(tolerances.gain_of(channel), load_gain),
-            *bench.within(tolerances.friction, *frictions, family="friction"),
+            *bench.within(has_several * tolerances.friction, *frictions, family="friction"),
         )
 
         def of_files(at: bench.Values, names: list[str]) -> Floats:
-            values = np.array([at[name] for name in names] or [0.0])
-            return np.asarray(values[files] if len(names) > 1 else values)
+            return np.array([at[name] for name in names])[files]
 
         def shown(at: bench.Values) -> Floats:
             true = (pressure - of_files(at, zeros)) / (1.0 + at[_GAIN])
@@ -140,27 +144,28 @@ class StaticTorqueProblem(bench.BenchLaw):
 
         is_high = pressure > 0.5 * (pressure.max() + pressure.min())
         groups = (
-            labels.tolist(),
-            [channel] * pressure.size,
-            np.where(branch > 0.0, "the rising branch", "the falling branch").tolist(),
-            np.where(is_high, "readings at higher pressures", "readings at lower pressures").tolist(),
+            labels,
+            channel,
+            np.where(branch > 0.0, "the rising branch", "the falling branch"),
+            np.where(is_high, "readings at higher pressures", "readings at lower pressures"),
         )
         fitted, model = bench.solve(shown, weight * load, groups, numbers, self.confidence)
-        values, model = fitted.by_name, model / weight
+        model = model / weight
         series = []
         for role, sign, motion in (("rising", 1.0, "with"), ("falling", -1.0, "against")):
             # An actuator that slides at constant pressure has two directions of motion as branches.
-            label, on = f"moving {motion} the pressure" if slides else f"pressure {role}", branch == sign
+            label = f"moving {motion} the pressure" if slides else f"pressure {role}"
+            on = branch == sign
             series.append((label, role, pressure[on], load[on], model[on]))
         ends = np.array([pressure.min(), pressure.max()])
-        straight = curve_mark("without friction", ends, values[slope_path] * ends + values[_ZERO])
-        scatter, scatter_unit = in_shown_unit(float(np.std(load - model)), unit)
+        straight = fitted.by_name[slope_path] * ends + fitted.by_name[_ZERO]
         axes = Kind("Pressure difference", "Pa_d", "pressure change"), Kind(channel.capitalize(), unit, channel)
         result = bench.result_of(
             sources,
             fitted,
-            f"{pressure.size} readings, {count_of(repetitions, 'repetition')}; scatter {scatter:.3g} {scatter_unit}",
-            with_residuals(f"Static {channel}", *axes, series, [straight]),
+            f"{pressure.size} readings, {count_of(repetitions, 'repetition')}; scatter "
+            f"{shown_text(np.std(load - model), unit, digits=3)}",
+            with_residuals(f"Static {channel}", *axes, series, [curve_mark("without friction", ends, straight)]),
         )
         # Friction that is certainly negative, or falls with the pressure, is none.
         for path, fault in (
@@ -208,18 +213,17 @@ def _used_readings(sources: Sources, channel: str, zero_of_pressure: float) -> F
         readings.check_moves(pooled, _PRESSURE)
     # Two levels fix a line, but do not show whether it is one. Slope, zero and growth of the friction are extrapolated
     # from the spread of the pressures to zero, which the jitter about one commanded pressure does not carry.
-    width = max(float(np.ptp(pressure)) / _BINS, _SAME_LEVEL * float(np.abs(pressure).max()), zero_of_pressure)
+    width = max(np.ptp(pressure) / _BINS, _SAME_LEVEL * np.abs(pressure).max(), zero_of_pressure)
     ordered = np.sort(pressure)
     # From the lowest reading of each level, or one that lies across the end of an interval would count twice.
     levels = first = 0
     while first < ordered.size:
-        levels, first = levels + 1, int(np.searchsorted(ordered, ordered[first] + width, "right"))
+        levels, first = levels + 1, np.searchsorted(ordered, ordered[first] + width, "right")
     if levels < _MINIMUM_LEVELS:
-        shown, unit = in_shown_unit(width, "Pa_d")
         why = f"{percentage(_SAME_LEVEL, 2)} of the highest" if width > zero_of_pressure else "[bench] zero_of_pressure"
         pooled.refuse(
             f"needs readings at {_MINIMUM_LEVELS} different pressures or more, not {levels}; pressures closer than "
-            f" {shown:.3g} {unit} ({why}) count as one"
+            f" {shown_text(width, 'Pa_d', digits=3)} ({why}) count as one"
         )
     for source in sources:
         readings.check_not_clipped(source, _PRESSURE, channel, source.recording[channel], _MORE_THAN_FRICTION)
@@ -228,16 +232,17 @@ def _used_readings(sources: Sources, channel: str, zero_of_pressure: float) -> F
 
 def _slides(sources: Sources) -> bool:
     """Return whether a position or an angle moves with the direction at constant pressure."""
-    motions, pressures = list[float](), list[float]()
+    motions = list[float]()
+    pressures = list[float]()
     for recording in (source.recording for source in sources):
         direction = recording["direction"]
         is_inside = (direction[1:] == direction[:-1]) & (direction[1:] != 0.0)
-        sweeps = 1 + int(np.count_nonzero(np.diff(direction[direction != 0.0])))
-        for name in (name for name in ("position", "angle", _PRESSURE) if name in recording):
+        sweeps = 1 + np.count_nonzero(np.diff(direction[direction != 0.0]))
+        for name in {"position", "angle", _PRESSURE} & {*recording.names}:
             # Mean change per sweep in one direction, relative to its range.
-            moved = abs(float(np.sum((direction[1:] * np.diff(recording[name]))[is_inside]))) / sweeps
-            span = pool(sources, name) if name == _PRESSURE else recording[name]
-            (pressures if name == _PRESSURE else motions).append(moved / max(float(np.ptp(span)), 1.0e-300))
+            moved = abs(np.sum((direction[1:] * np.diff(recording[name]))[is_inside])) / sweeps
+            of_all, span = (pressures, pool(sources, name)) if name == _PRESSURE else (motions, recording[name])
+            of_all.append(moved / max(np.ptp(span), 1.0e-300))
     return bool(motions) and min(motions) > _MOVES_WITH_DIRECTION > max(pressures)
 
 
@@ -255,7 +260,7 @@ def _straight_line(
     slope, zero, friction = solution.tolist()
     if slope <= 0.0:
         source.refuse(f"the {channel} decreases while the pressure difference increases: a wrong sign of one of them")
-    deviation = float(np.std(load - design @ solution))
+    deviation = np.std(load - design @ solution)
     # Where friction is small its sign is the noise's, and no reason to refuse.
     if friction < -_SIGMAS * deviation / np.sqrt(pressure.size):
         source.refuse(

@@ -73,11 +73,14 @@ class ValveMapProblem(flow.FlowLaw):
         gas, path = self.gas_of(sources, context), context.valve_path(self.valve)
         readings.check_sources(sources, _MINIMUM_SAMPLES, ("command", "mass_flow"), absolute=_PRESSURES)
         command, upstream, downstream = (pool(sources, name) for name in ("command", *_PRESSURES))
-        direction, zero = np.sign(command * (upstream - downstream)), context.tolerances.zero_of_flow
         is_read = np.ones(command.size, dtype=bool)
-        measured, is_possible, remarks = readings.meter_readings(sources, direction, zero, is_read)
-        branch, size = np.concatenate([_branch_of(source) for source in sources]), np.abs(command)
-        if (span := float(np.ptp(command))) < _MINIMUM_RANGE:
+        measured, is_possible, remarks = readings.meter_readings(
+            sources, np.sign(command * (upstream - downstream)), context.tolerances.zero_of_flow, is_read
+        )
+        branch = np.concatenate([_branch_of(source) for source in sources])
+        size = np.abs(command)
+        span = np.ptp(command)
+        if span < _MINIMUM_RANGE:
             sources[0].refuse(f"the command covers a range of {span:.3g}, not {_MINIMUM_RANGE:g} or more")
         readings.check_no_wrong_reading(sources, "mass_flow", (command, branch), is_read)
         shape = np.abs(flow.orifice_shape(upstream, downstream, gas.heat_capacity_ratio))
@@ -85,10 +88,11 @@ class ValveMapProblem(flow.FlowLaw):
             sources[0].refuse("both pressures are equal in all readings, so nothing drives a flow")
         # Flow over flow per area at the measured pressures, so that a sagging supply is no saturation.
         areas = np.where(shape > 0.0, measured / (gas.choked_flow_constant * np.maximum(shape, 1e-3)), 0.0)
-        if float(command @ areas) <= 0.0:
+        if command @ areas <= 0.0:
             sources[0].refuse("the flow into chamber 1 falls as the command rises: a wrong sign of one of them")
         # Backlash is seen where the command both rises and falls.
-        is_two_way, highest = bool((branch > 0).any() and (branch < 0).any()), float(size.max())
+        is_two_way = (branch > 0).any() and (branch < 0).any()
+        highest = size.max()
         band = f"{path}.dead_band"
         openings = [f"{SECTION}.opening.opening_{number:02}" for number in range(1, len(self.nodes) + 1)]
         pressures = dict(zip(_PRESSURES, (upstream, downstream), strict=True))
@@ -119,10 +123,10 @@ class ValveMapProblem(flow.FlowLaw):
 
         groups = (
             bench.recordings_of(sources),
-            ["mass_flow"] * measured.size,
-            np.where(branch < 0.0, "falling commands", "rising commands").tolist(),
-            np.where(command > 0.0, "commands to chamber 1", "commands to chamber 2").tolist(),
-            np.where(size > 0.5 * highest, "large commands", "small commands").tolist(),
+            "mass_flow",
+            np.where(branch < 0.0, "falling commands", "rising commands"),
+            np.where(command > 0.0, "commands to chamber 1", "commands to chamber 2"),
+            np.where(size > 0.5 * highest, "large commands", "small commands"),
         )
         fitted, model = bench.solve(shown, measured, groups, numbers, self.confidence)
         reason = ""
@@ -159,7 +163,7 @@ class ValveMapProblem(flow.FlowLaw):
             remarks,
         )
         if self.nodes:
-            return self._as_table(result, band, openings)
+            return self._as_table(result, band)
         # Near the highest command there is no saturation to be seen.
         seen = [item for item in result.estimates if item.path != _SATURATION or item.value < highest - _SATURATES]
         return replace(result, estimates=tuple(seen))
@@ -172,7 +176,8 @@ class ValveMapProblem(flow.FlowLaw):
         ``band`` and ``openings`` are paths of the straight line or the table. Raises IdentificationError,
         with the name of ``source``, if the readings do not determine them.
         """
-        largest, highest = float(areas.max()), float(size.max())
+        largest = float(areas.max())
+        highest = float(size.max())
         if self.nodes:
             ends = [0.0, *self.nodes, 1.0]
             if highest < _NEARLY_FULL:
@@ -207,18 +212,19 @@ class ValveMapProblem(flow.FlowLaw):
             bench.sought(_SATURATION, inside, half, end, highest, text=of_end),
         )
 
-    def _as_table(self, result: bench.BenchResult, band: str, openings: Sequence[str]) -> bench.BenchResult:
+    def _as_table(self, result: bench.BenchResult, band: str) -> bench.BenchResult:
         """Return the result with openings that do not fall, and beside them commands and no dead band, for a set."""
-        highest, (full, *others) = 0.0, result.estimates
-        nodes = [estimate for estimate in others if estimate.path in openings]
+        count = 1 + len(self.nodes)
+        nodes = result.estimates[1:count]
         usable = [node.verdict for node in nodes if node.is_usable]
         # Shut and fully open are what a node may be; a table without one of its nodes is none.
         is_whole = all(node.is_usable or node.verdict == "at its bound" for node in nodes)
-        of_bound: Verdict = usable[0] if usable else "at its bound"
+        of_bound: Verdict = (*usable, "at its bound")[0] if is_whole else "not identifiable"
+        highest = 0.0
         table = []
         for number, (node, command) in enumerate(zip(nodes, self.nodes, strict=True), 1):
             highest = max(highest, node.value)
-            verdict: Verdict = (node.verdict if node.is_usable else of_bound) if is_whole else "not identifiable"
+            verdict = node.verdict if is_whole and node.is_usable else of_bound
             beside = {f"{SECTION}.opening.command_{number:02}": command, band: 0.0}
             low, high = min(node.low, highest), max(node.high, highest)
             table.append(replace(node, value=highest, low=low, high=high, beside=beside, verdict=verdict))
@@ -226,17 +232,19 @@ class ValveMapProblem(flow.FlowLaw):
             f"the openings are shares of {_FULL}, and the size of the valve in the set stays; no interval counts that "
             "the opening is straight between two nodes"
         )
-        return replace(result, estimates=(full, *table, *others[len(nodes) :]), remarks=(*result.remarks, remark))
+        estimates = (result.estimates[0], *table, *result.estimates[count:])
+        return replace(result, estimates=estimates, remarks=(*result.remarks, remark))
 
 
 def _branch_of(source: RecordingSource) -> Floats:
     """Return the direction of the command, 1 rising and -1 falling; unless recorded, it is that of the last change."""
     check_command(source.recording, source.where)
+    if "direction" in source.recording:
+        return source.recording["direction"]
     requested = source.recording["command"]
     # Before the first change it is 0.
     signs = np.sign(np.diff(requested, prepend=requested[0]))
-    last = np.maximum.accumulate(np.where(signs != 0.0, np.arange(signs.size), 0))
-    return source.recording["direction"] if "direction" in source.recording else np.asarray(signs[last])
+    return np.asarray(signs[np.maximum.accumulate(np.arange(signs.size) * (signs != 0.0))])
 
 
 def area_of_command(

@@ -127,13 +127,12 @@ class LeakLaw(flow.FlowLaw):
         result = bench.result_of(sources, chosen, summary, panels, reason, remarks, scatter)
         if rival is not chosen:
             with_gap, fit_with_gap = (other, rival) if opening.has_sought_ratio else (opening, chosen)
-            has_gap = float(fit_with_gap.low[1]) > 0.0
+            has_gap = fit_with_gap.low[1] > 0.0
             quantities = list[str]()
-            for number, value in zip(rival.numbers, rival.values.tolist(), strict=True):
-                if number.text:
-                    is_none = number.path == with_gap.gap.path and not has_gap
-                    size = shown_text(0.0 if is_none else value, number.unit, digits=3)
-                    quantities.append(f"{number.path.rpartition('.')[2]} = {size}")
+            for number in (number for number in rival.numbers if number.text):
+                is_none = number.path == with_gap.gap.path and not has_gap
+                size = shown_text(0.0 if is_none else rival.by_name[number.path], number.unit, digits=3)
+                quantities.append(f"{number.path.rpartition('.')[2]} = {size}")
             named = f"law = '{other.law}' ({', '.join(quantities)})"
             if advantage >= _CLEAR:
                 better = (
@@ -191,8 +190,7 @@ class SteadyLeakProblem(LeakLaw):
         # A wrong law gives different sizes at low and at high pressures.
         difference, ratio = first - second, np.minimum(first, second) / np.maximum(first, second)
         is_high = difference > np.median(difference)
-        halves = np.where(is_high, "flow at higher pressures", "flow at lower pressures").tolist()
-        groups = recorded, ["mass_flow"] * metered.size, halves
+        groups = recorded, "mass_flow", np.where(is_high, "flow at higher pressures", "flow at lower pressures")
         has_both = flow.has_both_regimes(openings[0], ratio, sources[0])
         fits = [
             flow.solve_flow(opening, pressures, metered, groups, context.tolerances, self.confidence, _TRIAL_RATIOS)
@@ -210,21 +208,21 @@ class SteadyLeakProblem(LeakLaw):
 class ChamberDecay(NamedTuple):
     """Decay of the pressures in two closed chambers.
 
-    ``time`` is in s; ``sensors`` are channel and pressures [Pa] of the fuller chamber and of the other; ``number`` is
-    the number of the decay. ``changes`` are the fall of the pressure in the fuller chamber and its rise in the other
-    [Pa]; ``room`` is the index of a constant pressure in ``sensors``, None if both change, ``changing`` that of the
-    pressure that determines the leak, and ``fitted`` are the sensors without that of the room. ``edge`` is the number
-    of samples averaged at an end, ``half`` the first sample with less than half of the pressure difference, ``fall``
-    its fall relative to the start [-].
+    ``time`` is in s; ``sensors`` are the pressures [Pa] by channel, that of the fuller chamber first; ``number`` is the
+    number of the decay. ``changes`` are the fall of the pressure in the fuller chamber and its rise in the other [Pa],
+    by channel; ``room`` is the channel of a constant pressure, empty if both change, ``changing`` that of the pressure
+    that determines the leak, and ``fitted`` are the sensors without that of the room. ``edge`` is the number of samples
+    averaged at an end, ``half`` the first sample with less than half of the pressure difference, ``fall`` its fall
+    relative to the start [-].
     """
 
     time: Floats
-    sensors: tuple[tuple[str, Floats], tuple[str, Floats]]
+    sensors: dict[str, Floats]
     number: int
-    changes: tuple[float, float]
-    room: int | None
-    changing: int
-    fitted: list[tuple[str, Floats]]
+    changes: dict[str, float]
+    room: str
+    changing: str
+    fitted: dict[str, Floats]
     edge: int
     half: int
     fall: float
@@ -249,24 +247,25 @@ def chamber_decay(source: RecordingSource, start: float | None, end: float | Non
     fuller, emptier = _CHAMBERS if is_first else _CHAMBERS[::-1]
     difference = part[fuller] - part[emptier]
     # Between nearly equal pressures, the zero errors of the sensors outweigh the difference.
-    low = np.flatnonzero(difference < _EQUAL * float(np.mean(difference[:edge])))
-    count = int(low[0]) if low.size else difference.size
+    is_low = difference < _EQUAL * np.mean(difference[:edge])
+    count = int(np.argmax(is_low)) if is_low.any() else difference.size
     readings.check_enough(source, count, _MINIMUM_SAMPLES, "samples from the start to equal pressures")
-    time, first, second = part.time[:count] - part.time[0], part[fuller][:count], part[emptier][:count]
-    edge, difference = max(1, min(_EDGE, count // 10)), first - second
-    fall, rise = (float(np.mean(each[-edge:]) - np.mean(each[:edge])) for each in (first, second))
-    stands = [abs(own) <= _STANDS_STILL * abs(beside) for own, beside in ((fall, rise), (rise, fall))]
-    room = 1 if stands[1] else 0 if stands[0] else None
-    initial, final = float(difference[0]), float(difference[-1])
-    if edge > 1:
-        # By straight lines through the samples at the edges: a mean over them would underestimate the fall.
-        initial = float(np.polyfit(time[:edge], difference[:edge], 1)[1])
-        final = float(np.polyfit(time[-edge:] - time[-1], difference[-edge:], 1)[1])
-    sensors = (fuller, first), (emptier, second)
+    time = part.time[:count] - part.time[0]
+    difference = difference[:count]
+    sensors = {name: part[name][:count] for name in (fuller, emptier)}
+    edge = min(_EDGE, count // 10)
+    fall, rise = (float(np.mean(values[-edge:]) - np.mean(values[:edge])) for values in sensors.values())
+    room = fuller if abs(fall) <= _STANDS_STILL * abs(rise) else ""
+    room = emptier if abs(rise) <= _STANDS_STILL * abs(fall) else room
+    changing = emptier if room == fuller else fuller
+    # By straight lines through the samples at the edges: a mean over them would underestimate the fall.
+    initial = np.polyfit(time[:edge], difference[:edge], 1)[1]
+    final = np.polyfit(time[-edge:] - time[-1], difference[-edge:], 1)[1]
     # The constant pressure of a room is not fitted.
-    fitted = [sensor for side, sensor in enumerate(sensors) if side != room]
-    half, lost = int(np.argmax(difference < 0.5 * (initial + final))), 1.0 - final / initial
-    return ChamberDecay(time, sensors, number, (-fall, rise), room, int(room == 0), fitted, edge, half, lost)
+    fitted = {name: values for name, values in sensors.items() if name != room}
+    half = int(np.argmax(difference < 0.5 * (initial + final)))
+    changes = {fuller: -fall, emptier: rise}
+    return ChamberDecay(time, sensors, number, changes, room, changing, fitted, edge, half, 1.0 - final / initial)
 
 
 def pressures_of_fall(
@@ -357,17 +356,17 @@ class VaneLeakProblem(LeakLaw, bench.TimedLaw):
         readings.check_sources(sources, _MINIMUM_SAMPLES, absolute=_CHAMBERS)
         for source in sources:
             # A chamber that is open to the room has a constant pressure.
-            readings.check_moves(source, max(_CHAMBERS, key=lambda name: float(np.ptp(source.recording[name]))))
+            readings.check_moves(source, max(_CHAMBERS, key=lambda name: np.ptp(source.recording[name])))
         decays = [chamber_decay(source, self.start, self.end, number) for number, source in enumerate(sources, start=1)]
         # The chamber whose pressure determines the leak empties, or fills from a room.
-        sides = {(decay.sensors[0][0], decay.sensors[decay.changing][0]) for decay in decays}
+        sides = {(decay.changing, *decay.sensors) for decay in decays}
         if len(sides) > 1:
             raise IdentificationError(
                 "chamber 1 empties in some recordings and chamber 2 in others, which are two leaks"
             )
-        chamber = 1 + _CHAMBERS.index(sides.pop()[1])
+        chamber = 1 + _CHAMBERS.index(decays[0].changing)
         volume, other_volume = (volume_1, volume_2) if chamber == 1 else (volume_2, volume_1)
-        ratio = np.concatenate([decay.sensors[1][1] / decay.sensors[0][1] for decay in decays])
+        ratio = np.concatenate([second / first for first, second in (decay.sensors.values() for decay in decays)])
         has_both = flow.has_both_regimes(openings[0], ratio, sources[0])
         if volume is None:
             # The fitted size is then the size divided by the volume.
@@ -379,12 +378,12 @@ class VaneLeakProblem(LeakLaw, bench.TimedLaw):
             *_unknowns(decays, volume, other_volume, volume_deviation),
             *flow.gas_tolerances(openings[0].gas, context.tolerances),
             *tolerance(_VOLUME, volume_deviation if volume else 0.0),
-            *bench.within(context.tolerances.zero_of_pressure, *(f"zero of {name}" for name, _ in decays[0].sensors)),
+            *bench.within(context.tolerances.zero_of_pressure, *(f"zero of {name}" for name in decays[0].sensors)),
         )
         # A wrong law gives different sizes early and late in a fall.
         parts = [(decay.half, decay.fitted) for decay in decays]
         measured, groups = bench.halved_readings(sources, parts, ("the early fall", "the late fall"))
-        longest = max(float(decay.time[-1]) for decay in decays)
+        longest = max(decay.time[-1] for decay in decays)
 
         def shown(at: bench.Values, opening: Opening) -> Floats:
             """Return P (1 + r exp(-t / tau)) + zero, P by ``pressures_of_fall`` with k in place of R T / V [Pa].
@@ -398,14 +397,15 @@ class VaneLeakProblem(LeakLaw, bench.TimedLaw):
             relaxation_time = longest / _RELAXED * math.exp(at[_RELAXATION])
             pressures = list[Floats]()
             for decay in decays:
-                first, second = (at[_START.format(sensor, decay.number)] for sensor, _ in decay.sensors)
-                of_volumes = at[_RATIO] if decay.room is None else 0.0 if decay.room == 1 else math.inf
+                fuller, emptier = decay.sensors
+                first, second = (at[_START.format(name, decay.number)] for name in decay.sensors)
+                of_volumes = {"": at[_RATIO], emptier: 0.0, fuller: math.inf}[decay.room]
                 falls = pressures_of_fall(opening, at, first, second, of_volumes, rate, decay.time)
                 faded = np.exp(-decay.time / relaxation_time)
-                for side, ((sensor, _), pressure) in enumerate(zip(decay.sensors, falls, strict=True)):
-                    if side != decay.room:
-                        relaxed = 1.0 + at[_RELAXED_BY.format(sensor, decay.number)] * faded
-                        pressures.append(pressure * relaxed + at[f"zero of {sensor}"])
+                for name, pressure in zip(decay.sensors, falls, strict=True):
+                    if name != decay.room:
+                        relaxed = 1.0 + at[_RELAXED_BY.format(name, decay.number)] * faded
+                        pressures.append(pressure * relaxed + at[f"zero of {name}"])
             return np.concatenate(pressures)
 
         fits = []
@@ -414,28 +414,32 @@ class VaneLeakProblem(LeakLaw, bench.TimedLaw):
             rate = opening.gas.specific_gas_constant * opening.gas.temperature / (volume or 1.0)
             sizes = []
             for decay in decays:
-                (_, first), (_, second) = decay.sensors
-                scatter = float(np.std(np.diff(decay.sensors[decay.changing][1])))
+                scatter = float(np.std(np.diff(decay.sensors[decay.changing])))
                 change = max(decay.changes[decay.changing], _SCATTER_OF_CHANGE * scatter, _LEAST_CHANGE)
+                first, second = decay.sensors.values()
                 flows = [
-                    float(np.mean(per * each)) for _, per, each in opening.parts(first, second, CRITICAL_RATIOS[0])
+                    float(np.mean(factor * shape))
+                    for _, factor, shape in opening.parts(first, second, CRITICAL_RATIOS[0])
                 ]
-                sizes.append([change / (rate * each * float(decay.time[-1])) for each in flows])
+                sizes.append([change / (rate * each * decay.time[-1]) for each in flows])
             alone = [float(np.mean(of_part)) for of_part in zip(*sizes, strict=True)]
             # The search starts from equal contributions of orifice and gap.
             unknowns = opening.unknowns([size / len(alone) for size in alone], alone, CRITICAL_RATIOS[0])
             of_opening = partial(shown, opening=opening)
             fits.append(bench.solve(of_opening, measured, groups, (*unknowns, *others), self.confidence))
-        curves = [(sensor, decay.time, values) for decay in decays for sensor, values in decay.fitted]
-        models = np.split(fits[0][1], np.cumsum([time.size for _, time, _ in curves])[:-1])
         # The legend names the first curve of each chamber only.
-        labels, law = {name: name.replace("pressure_", "chamber ") for name in _CHAMBERS}, LAW_NAMES[openings[0].law]
-        series = [
-            (labels.pop(sensor, ""), sensor, time, values, model)
-            for (sensor, time, values), model in zip(curves, models, strict=True)
+        labels = {name: name.replace("pressure_", "chamber ") for name in _CHAMBERS}
+        model = fits[0][1]
+        series = []
+        for decay in decays:
+            for sensor, values in decay.fitted.items():
+                series.append((labels.pop(sensor, ""), sensor, decay.time, values, model[: values.size]))
+                model = model[values.size :]
+        drawn = [
+            curve_mark("" if row else LAW_NAMES[openings[0].law], time, model)
+            for row, (*_, time, _, model) in enumerate(series)
         ]
-        drawn = [curve_mark("" if row else law, time, model) for row, (*_, time, _, model) in enumerate(series)]
-        if all(decay.room is not None for decay in decays):
+        if all(decay.room for decay in decays):
             remarks = (*remarks, f"the pressure in chamber {3 - chamber} is constant, so it is treated as a reservoir")
         fall = max(decay.fall for decay in decays)
         summary = (
@@ -463,7 +467,7 @@ def _unknowns(
     relative standard ``deviation`` [-]. The initial pressure of a room has a prior from the samples of the room.
     """
     unknowns = list[FitNumber]()
-    changes = [decay.changes for decay in decays if decay.room is None]
+    changes = [decay.changes.values() for decay in decays if not decay.room]
     if changes and volume and other_volume:
         ratio = volume / other_volume
         unknowns += tolerance(_RATIO, math.sqrt(2.0) * deviation * ratio, ratio)
@@ -471,14 +475,14 @@ def _unknowns(
         ratio = max(float(np.mean([rise / fall for fall, rise in changes])), 1.0e-3)
         unknowns.append(bench.sought(_RATIO, ratio, 1.0e-6))
     for decay in decays:
-        for side, (sensor, values) in enumerate(decay.sensors):
+        for sensor, values in decay.sensors.items():
             scale = max(abs(decay.changes[decay.changing]), float(np.std(np.diff(values))), _LEAST_PRESSURE)
-            start, spread = float(values[: decay.edge].mean()), math.inf
-            if side == decay.room:
-                start, spread = float(values.mean()), max(float(values.std()), _LEAST_PRESSURE)
+            start, spread = values[: decay.edge].mean(), math.inf
+            if sensor == decay.room:
+                start, spread = values.mean(), max(values.std(), _LEAST_PRESSURE)
             name = _START.format(sensor, decay.number)
             unknowns.append(bench.sought(name, start, _LEAST_PRESSURE, scale=scale, deviation=spread))
-        for sensor, _ in decay.fitted:
+        for sensor in decay.fitted:
             unknowns += bench.within(_MOST_RELAXED, _RELAXED_BY.format(sensor, decay.number))
     # Only the order of magnitude of tau is known, so the variable is its logarithm.
     return [*unknowns, FitNumber(_RELAXATION, 0.0, low=-5.0, high=math.log(_RELAXED), scale=1.0, deviation=1.5)]
