@@ -338,3 +338,15 @@ def test_pressure_counts_forward(
         wrong = csv_of({**columns, "centre_of_pressure [m]": metres * (1.0 + stance)})
         with pytest.raises(DataError, match=r"centre_of_pressure is .* m in front of the ankle \(plausible: within"):
             import_gait([wrong], ImportSettings(62.0))
+
+
+@pytest.mark.parametrize("zero", [0.035, -0.04, 0.08])
+def test_a_zero_of_the_plate_is_what_it_shows_in_swing(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], normative: Gait, zero: float
+) -> None:
+    (force,) = (name for name in columns if name.startswith("vertical_force"))
+    columns[force] += zero * float(np.max(columns[force])) / 1.1
+    found = import_gait([csv_of(columns)], ImportSettings(62.0))
+    assert found.gait.strides == 5
+    assert found.gait.stance_share == pytest.approx(normative.stance_share, abs=0.012)
+    assert any("zero of the plate" in remark for remark in found.remarks)

@@ -58,6 +58,11 @@ other foot the angle increases."""
 _LEAST_LEAN_OF_PART = 0.1
 """Least decrease of the shank angle, relative to its range [-], over a contact cut by an end of the record."""
 
+_IN_SWING = 0.1
+"""Fraction of the samples [-] that are in swing at least."""
+_ZEROS = 0.01, 0.1
+"""Least and largest zero error of a plate [body weights]."""
+
 Contact = tuple[float | None, float | None]
 """Heel strike and toe-off [s]; None for an end that is outside the record."""
 
@@ -231,6 +236,13 @@ def find_footfalls(
     if any(table.is_mean_stride for table in tables):
         turned = _of_walk(walk, (), side, 1)
         return replace(turned, strides=usable_strides(walk, turned.strides)[:1], is_one_cycle=True)
+    # In swing a plate shows its zero.
+    zero = float(np.quantile(walk[FORCE].values, _IN_SWING)) if FORCE in walk else 0.0
+    if _ZEROS[0] < abs(zero) < _ZEROS[1]:
+        zeroed = replace(walk[FORCE], values=walk[FORCE].values - zero)
+        footfalls = find_footfalls({**walk, FORCE: zeroed}, tables, side, given_least)
+        remark = f"vertical_force reads {zero:+.2%} of body weight in swing: taken as zero of the plate"
+        return replace(footfalls, remarks=(*footfalls.remarks, remark))
     least = given_least or LEAST_STRIDES
     footfalls = _of_walk(walk, tables, side, least)
     usable = usable_strides(walk, footfalls.strides)
