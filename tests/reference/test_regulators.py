@@ -188,7 +188,7 @@ WAVE = {"of": "angle", "kind": "sine", "level": "90 deg", "amplitude": "10 deg",
             ("response_time=0.2 s", "hysteresis=0.02", "resolution=0.2"),
             "resolution = 0.2",
         ),
-        ({"kind": "cascade"}, "", ("response_time=1 s",), "response_time = 1 s"),
+        ({"kind": "cascade"}, "", ("response_time=4 s",), "response_time = 4 s"),
     ],
 )
 def test_a_verdict_names_the_number_of_the_regulator_that_is_at_fault(

@@ -103,7 +103,7 @@ def test_what_is_missing_is_named(line: str, missing: str) -> None:
         (
             '"0.095 1/(N m)"',
             '"-1 1/(N m)"',
-            "must be at least 0 1/(N m) and at most 1000 1/(N m) (k_p)",
+            "must be at least 0 1/(N m) and at most 1e+06 1/(N m) (k_p)",
         ),
         ('"0 psi_g"', '"50 psi"', "'psi' needs the kind of pressure"),
         ('"0 psi_g"', '"50 psi_d"', "a pressure level is needed"),

@@ -55,7 +55,7 @@ def test_every_torque_law_has_half_the_gain_at_which_the_dead_time_moves_it_by_w
 
 def test_the_other_words_for_the_same_bandwidth() -> None:
     sliding = load_walk("proportional", ["controller.kind=sliding_mode", *SMALL_AIR])
-    rate, theta, _ = by_hand(sliding)
+    rate, theta, *_ = by_hand(sliding)
     assert (sliding.controller.reaching_command, sliding.controller.boundary_layer) == pytest.approx(
         (1.0, 2.0 * rate * theta)
     )

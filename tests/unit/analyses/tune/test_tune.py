@@ -135,7 +135,7 @@ def test_the_tunings_of_the_package_load_and_fit_the_published_schema() -> None:
             {"search": [DOCUMENT["search"][0] | {"minimum": "0 1/(N m)", "spacing": "logarithmic"}]},
             "minimum = '0 1/(N m)' must be above 0",
         ),
-        ({"search": [DOCUMENT["search"][0] | {"maximum": "1e9 1/(N m)"}]}, "at most 1000 1/(N m)"),
+        ({"search": [DOCUMENT["search"][0] | {"maximum": "1e9 1/(N m)"}]}, "at most 1e+06 1/(N m)"),
         (
             {
                 "search": [
