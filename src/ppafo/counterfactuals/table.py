@@ -21,7 +21,7 @@ from ppafo.simulation.numbers import declared_numbers, moving_together, present_
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.rule import most_reversals, needed_metrics, smallest_change, tracking_excess
 
-_TIME_OF_OBJECT = 0.5
+_TIME_OF_OBJECT = 0.8
 """Processor time [s] after which no further run of a table with a Python object begins: single changes, and pairs."""
 _ANY_NUMBER = "gas.temperature"
 """Path of a number that every scenario has, as the column of runs that vary none."""
