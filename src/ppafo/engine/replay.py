@@ -3,6 +3,7 @@
 Between two changes of the inputs a run proceeds without interruption, so that constant inputs cost only a few calls.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -13,7 +14,6 @@ from ppafo.control.kind import ProfileKind
 from ppafo.engine.lane_rows import lanes_of
 from ppafo.engine.lanes import Batch, BatchResult, Floats, begin_block, join_results
 from ppafo.engine.rows import group_of, leaf_paths, leaves, of_each, row_numbers
-from ppafo.engine.step.lane import LaneTiming
 
 COMMAND = "result.command"
 """Path of the present command among the states of a program."""
@@ -56,7 +56,10 @@ class StepInputs:
     parameters: Mapping[str, Floats]
     """Values of each step (steps,) [SI] by the path of a parameter such as ``plant.supply_pressure``."""
     earlier: Floats | None = None
-    """Commands of the steps before the first (steps,) [-], the first of which has always stood; None without any."""
+    """Commands of the steps before the first (steps,) [-], the first of which has always stood; None without any.
+
+    A first one that is not a number stands for the command that holds the pressures at the start, 0 of most valves.
+    """
 
 
 def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
@@ -74,14 +77,15 @@ def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
     # Steps at which any input differs from the step before, the first step among them.
     starts = [0, *(np.flatnonzero((np.diff(table, axis=1) != 0.0).any(axis=0)) + 1).tolist()]
     ends = [*starts[1:], batch.clock.step_count]
-    results = []
+    results, before = [], None
     if inputs.earlier is not None:
-        batch = replace(batch, states=_with_valves_after(batch, inputs.earlier))
+        states, before = _started(batch, inputs.earlier)
+        batch = replace(batch, states=states)
     for runs_of_block in blocks:
         parameters, states = batch.parameters[:, runs_of_block], batch.states[:, runs_of_block]
         block = begin_block(replace(batch, parameters=parameters, states=states))
-        if inputs.earlier is not None:
-            block.set_earlier(inputs.earlier)
+        if before is not None:
+            block.set_earlier(before[:, runs_of_block])
         for start, end in zip(starts, ends, strict=True):
             if inputs.command is not None:
                 block.states[command_row] = inputs.command[start]
@@ -92,29 +96,38 @@ def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
     return join_results(results)
 
 
-def _with_valves_after(batch: Batch, earlier: Floats) -> Floats:
-    """Return the initial states (rows, runs) of a batch with valves as they are after earlier commands (steps,)."""
-    program, delay = batch.program, batch.clock.command_delay
+def _started(batch: Batch, earlier: Floats) -> tuple[Floats, Floats]:
+    """Return initial states (rows, runs) with valves as after earlier commands (steps,), and these (steps, runs).
+
+    For a first one that is not known stands the command that holds the pressures at the start.
+    """
+    program, delay, states = batch.program, batch.clock.command_delay, batch.states.copy()
+    valve, kinds = program.valve, program.parameter_rows()
     # The last ones have not arrived yet.
     arrived = earlier[: max(1, earlier.size - delay)]
     changes = np.flatnonzero(np.diff(arrived)) + 1
-    commands = arrived[[0, *changes]].tolist()
 
-    def valve_at_start(valve: Any, timing: LaneTiming) -> Any:
+    def at_start(own: Any, timing: Any, plant: Any, state: Any) -> tuple[float, Any]:
+        pressures = program.actuator.pressures(plant, state.angle, state.mass_1, state.mass_2)
+        first = float(arrived[0])
+        if math.isnan(first):
+            first = 0.0 if valve.command_for is None else valve.command_for(own, 0.0, *pressures)
         begins = (changes - earlier.size + delay + timing.command_lag) * timing.step
-        state, time = program.valve.state(), _LONG_AGO
-        for command, end in zip(commands, [*begins.tolist(), 0.0], strict=True):
+        shown, time = valve.state(), _LONG_AGO
+        for command, end in zip([first, *arrived[changes].tolist()], [*begins.tolist(), 0.0], strict=True):
+            if time == _LONG_AGO and valve.holding is not None:
+                shown, time = valve.holding(own, command, *pressures), end
             while time < end:
-                settled = program.valve.settle(valve, state, command, time)
-                event = program.valve.next_event(valve, settled, command, time)
-                until = min(end, max(event, time + _LEAST_PART))
-                _, state = program.valve.advance(valve, state, command, time, until - time)
+                settled = valve.settle(own, shown, command, time)
+                until = min(end, max(valve.next_event(own, settled, command, time), time + _LEAST_PART))
+                _, shown = valve.advance(own, shown, command, time, until - time)
                 time = until
-        return state
+        return first, shown
 
-    groups, states = program.parameter_rows(), batch.states.copy()
-    given = (group_of(name, groups, batch.parameters) for name in ("valve", "timing"))
-    rows, numbers = row_numbers(program.state_rows()), leaves(of_each(valve_at_start, *given))
-    for path, values in zip(leaf_paths(program.valve.state, "valve_state"), numbers, strict=True):
-        states[rows[path]] = values
-    return states
+    state_kinds = program.state_rows()
+    given = (group_of(name, kinds, batch.parameters) for name in ("valve", "timing", "plant"))
+    first, shown = of_each(at_start, *given, group_of("state", state_kinds, states))
+    numbers = row_numbers(state_kinds)
+    for path, values in zip(leaf_paths(valve.state, "valve_state"), leaves(shown), strict=True):
+        states[numbers[path]] = values
+    return states, np.where(np.isnan(earlier[:, None]), first, earlier[:, None])

@@ -1,5 +1,6 @@
 """Inputs of a run from a recording, at each step: command, supply pressures, external torque and angle."""
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 
@@ -65,8 +66,8 @@ def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
         has_stood = first.any() and motion_at(recording, begin) is not None
         count = int(min(inputs.start - begin, _HISTORY) / run.step)
         before = _values_at_steps(inputs, COMMAND, run, -count)[:count]
-        # The first of them has always stood.
-        earlier = np.concatenate([first if has_stood else [0.0], before])
+        # Ahead of them stands the first command, or what holds the pressures at the start.
+        earlier = np.concatenate([first if has_stood else [math.nan], before])
     # The parameters that follow a recording [SI], for every step.
     followed: dict[str, Floats] = {}
     # Later ones prevail: a regulator with a recording of its own does not follow the supply.
