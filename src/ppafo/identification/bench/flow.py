@@ -256,13 +256,14 @@ class Opening:
         laminar = np.asarray(first**2 - second**2)
         if self.law == "laminar":
             return [(self.size.path, 1.0, laminar)]
-        gap = [(self.gap.path, 1.0, laminar)] if self.law == "both" else []
-        if self.law == "iso6358" or (gap and self.critical_ratio is not None):
-            known = ratio if self.critical_ratio is None else self.critical_ratio
+        has_gap = self.law == "both"
+        factor = self.known * self.gas.choked_flow_constant
+        if self.law == "iso6358" or (has_gap and self.critical_ratio is not None):
             factor = self.gas.flow_per_sonic_conductance
-            return [(self.size.path, factor, iso6358_shape(first, second, known)), *gap]
-        shape = orifice_shape(first, second, self.gas.heat_capacity_ratio)
-        return [(self.size.path, self.known * self.gas.choked_flow_constant, shape), *gap]
+            shape = iso6358_shape(first, second, ratio if self.critical_ratio is None else self.critical_ratio)
+        else:
+            shape = orifice_shape(first, second, self.gas.heat_capacity_ratio)
+        return [(self.size.path, factor, shape), (self.gap.path, 1.0, laminar)][: 1 + has_gap]
 
     def flow(self, sizes: bench.Values, first: Floats, second: Floats) -> Floats:
         """Return the mass flow [kg/s] for pressures [Pa] and sizes by path, positive from first to second."""

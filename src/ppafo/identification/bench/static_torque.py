@@ -132,13 +132,10 @@ class StaticTorqueProblem(bench.BenchLaw):
             *bench.within(has_several * tolerances.friction, *frictions, family="friction"),
         )
 
-        def of_files(at: bench.Values, names: list[str]) -> Floats:
-            return np.array([at[name] for name in names])[files]
-
         def shown(at: bench.Values) -> Floats:
-            true = (pressure - of_files(at, zeros)) / (1.0 + at[_GAIN])
-            resisting = branch * (at[friction_path] + at[growth_path] * np.abs(true))
-            resisting = resisting * (1.0 + of_files(at, frictions))
+            zero_of_pressure, unlike = (np.array([at[name] for name in names])[files] for names in (zeros, frictions))
+            true = (pressure - zero_of_pressure) / (1.0 + at[_GAIN])
+            resisting = branch * (at[friction_path] + at[growth_path] * np.abs(true)) * (1.0 + unlike)
             # Loads over their noise.
             return np.asarray(weight * ((1.0 + at[load_gain]) * (at[slope_path] * true - resisting) + at[_ZERO]))
 

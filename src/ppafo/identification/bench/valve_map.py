@@ -114,12 +114,15 @@ class ValveMapProblem(flow.FlowLaw):
             else:
                 area = area_of_command(spool, at[band], at[_GAIN], at[_SATURATION], at[_ROUND])
 
-            def through(first: Floats, second: Floats) -> Floats:
-                shape = np.abs(flow.orifice_shape(first, second, gas.heat_capacity_ratio))
-                return np.asarray(area * gas.choked_flow_constant * shape)
-
             # A play needs every command, so that readings that cannot be drop out of the flow alone.
-            return np.asarray(np.where(is_possible, flow.shown_flow(at, gas, pressures, through), measured))
+            per_shape = area * gas.choked_flow_constant
+            through = flow.shown_flow(
+                at,
+                gas,
+                pressures,
+                lambda first, second: per_shape * np.abs(flow.orifice_shape(first, second, gas.heat_capacity_ratio)),
+            )
+            return np.asarray(np.where(is_possible, through, measured))
 
         groups = (
             bench.recordings_of(sources),
