@@ -2,6 +2,7 @@
 
 from ppafo.arguments.values import taken_tasks
 from ppafo.counterfactuals import verdict_of
+from ppafo.counterfactuals.joint_gains import joint_gains
 from ppafo.loading import load_scenario, placed, reloaded, scenario_or_load, usage_text, with_overrides
 from ppafo.metrics import METRICS, Metric
 from ppafo.metrics.tracking import TRACKING

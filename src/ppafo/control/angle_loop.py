@@ -42,6 +42,8 @@ INNER_GAIN = 0.75
 """Gain of the inner torque loop times R theta; twice as much makes it oscillate."""
 SHARE_OF_SPRING = 0.5
 """Part of the gas spring in the stiffness k_a; with the whole of it the mass would oscillate on the gas."""
+LIGHT = 0.7
+"""Largest theta sqrt(S/I) [-] at which these gains are stable without friction, for 0.7 to 1.3 times R."""
 LEAST_TOLERANCE = math.radians(0.5)
 """Smallest tolerance [rad]: about the play of an orthosis on its wearer, for every drive."""
 STEPS_OF_TOLERANCE = 2.0
@@ -77,6 +79,11 @@ class Joint(NamedTuple):
     gravity: float
     resolution: float
     noise: float
+
+
+def lightness(loop: TorqueLoop, joint: Joint) -> float:
+    """Dead time times the frequency of the joint on its gas, theta sqrt(S/I) [-]."""
+    return loop.dead_time * math.sqrt(joint.shut_in / joint.inertia)
 
 
 def bandwidth(loop: TorqueLoop, joint: Joint) -> float:

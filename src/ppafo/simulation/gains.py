@@ -5,6 +5,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from functools import partial
 
+from ppafo.control.angle_loop import LIGHT, lightness
 from ppafo.control.kind import ControllerKind
 from ppafo.control.torque_loop import TorqueLoop
 from ppafo.model.controlled import CONTROLLED, TORQUE
@@ -46,6 +47,8 @@ class Gains:
     unit: str = "N m"
     unknown_loads: tuple[str, ...] = ()
     """Effects that load a movable joint and are not included in the computed gains."""
+    lightness: float = 0.0
+    """Dead time times the frequency of the joint on its gas [-]; 0 for a law without a torque loop inside."""
 
     @property
     def sentence(self) -> str:
@@ -57,7 +60,8 @@ class Gains:
             texts = [f"{gain.name} {shown_text(gain.value, gain.unit, '.3g')}" for gain in gains]
             parts += [f"{', '.join(texts)} {origin}"] if texts else []
         without = f"; the load of {', '.join(self.unknown_loads)} is not included" if self.unknown_loads else ""
-        return f"gains: {'; '.join(parts)}{without}"
+        light = f"; friction alone keeps the joint still: theta sqrt(S/I) = {self.lightness:.2g}, above {LIGHT:g}"
+        return f"gains: {'; '.join(parts)}{without}{light * (self.lightness > LIGHT)}"
 
 
 def loop_of(scenario: Scenario, law: ControllerKind) -> TorqueLoop:
@@ -79,7 +83,9 @@ def gains_of(scenario: Scenario) -> Gains | None:
     ]
     if not items:
         return None
-    loop = loop_of(scenario, law)
+    parts, asked = loop_parts(scenario, law), Asked(partial(number_at, scenario))
+    loop: TorqueLoop = parts.group("loop", asked, {})
+    light = 0.0 if parts.controls_torque else lightness(loop, parts.group("joint", asked, {}))
     gains = tuple(
         _Gain(item.name, item.unit, float(settings[item.name]), f"controller.{item.name}" in scenario.links)
         for item in items
@@ -88,7 +94,8 @@ def gains_of(scenario: Scenario) -> Gains | None:
     # A load moves the chambers of a joint that nothing leads, also of one whose torque is controlled.
     of_joint = any(gain.computed for gain in gains) and not isinstance(scenario.motion, PrescribedMotion)
     loads = [effect.section for effect in effects_of(scenario.device) if load_torque in effect.laws]
-    return Gains(gains, loop.rate, loop.dead_time, CONTROLLED[controlled].plain_unit, tuple(loads) if of_joint else ())
+    unit, unknown = CONTROLLED[controlled].plain_unit, tuple(loads) if of_joint else ()
+    return Gains(gains, loop.rate, loop.dead_time, unit, unknown, light)
 
 
 @in_units(lambda scenario, _varied: scenario.device.shown)
