@@ -7,10 +7,8 @@ number, so that no change makes it slower; a change of a kind is a scenario of i
 import contextlib
 import functools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any, Literal, NamedTuple
-
-import numpy as np
 
 from ppafo.control.catalog import PROFILES
 from ppafo.control.kind import PythonController
@@ -46,7 +44,7 @@ from ppafo.simulation.tracking.rule import only_switches
 
 Group = Literal["law", "start", "device", "sensors", "load", "task"]
 """Part of a scenario that a change concerns."""
-AS_IT_IS, OTHER_GAINS, _DEFAULT = "as it is", "with other gains", "with the default"
+AS_IT_IS, JOINT_GAINS, _DEFAULT = "as it is", "with all gains chosen together", "with the default"
 _IDEAL_WORDS = ("without", "with a quicker", "with a straight", "with initial", "with gas", "with the sign")
 """First words of changes that make a property ideal."""
 SLOWER_REFERENCE = "with a slower reference"
@@ -108,7 +106,7 @@ _GAINS = (
     "release",
     "opening",
 )
-"""Gains that are drawn together; the others follow them or are numbers of the device."""
+"""Gains that are chosen together; the others follow them or are numbers of the device."""
 _SAME = 0.02
 """Relative difference up to which two settings count as the same [-]."""
 _COMMANDS = (-1.0, 64.0, 8.0, 1.0 / 16.0)
@@ -374,19 +372,7 @@ def _other_kinds(scenario: Scenario) -> Iterator[Change]:
             yield Change(words, group, {}, reloaded(scenario, [override]), (override,))  # type: ignore[arg-type]
 
 
-def drawn_gains(scenario: Scenario, centre: Mapping[str, float], draws: int, width: float) -> list[Change]:
-    """Return changes of all gains within a factor ``width`` of ``centre``: by one factor, each alone, and drawn."""
-    paths, generator = list(centre), np.random.default_rng(len(centre))
-    rows = generator.uniform(-1.0, 1.0, (draws, len(paths)))
-    alone = [np.linspace(-1.0, 1.0, 5)[:, None] * (np.arange(len(paths)) == place) for place in range(len(paths))]
-    rows = np.vstack([np.linspace(-1.0, 1.0, 9)[:, None] * np.ones(len(paths)), *alone, rows])
-    of_rows: Sequence[Mapping[str, float]] = [
-        {path: float(centre[path] * width**share) for path, share in zip(paths, row, strict=True)} for row in rows
-    ]
-    return [Change(OTHER_GAINS, "law", numbers, scenario) for numbers in of_rows]
-
-
-def drawn_settings(scenario: Scenario) -> dict[str, float]:
+def gains_together(scenario: Scenario) -> dict[str, float]:
     """Return the gains [SI] of a law that decide how it moves, by path; none of a Python object."""
     settings = {} if scenario.law is None else scenario.controller.settings
     return {f"controller.{name}": float(settings[name]) for name in _GAINS if settings.get(name)}

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.counterfactuals.changes import OTHER_GAINS, Change, drawn_settings
+from ppafo.counterfactuals.changes import JOINT_GAINS, Change, gains_together
 from ppafo.counterfactuals.table import excesses
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import Scenario
@@ -40,24 +40,26 @@ class JointGains(NamedTuple):
 
 
 def joint_gains(scenario: Scenario, paths: Collection[str] = ()) -> JointGains | None:
-    """Return the gains of a scenario chosen together, of which the worst of three devices follows best.
+    """Return the gains of a scenario chosen together, of which the worst of three devices follows best; of a walk one.
 
     The law knows the nominal device. Where no gains suffice on all three, those that suit the nominal one are chosen.
 
     Arguments:
-        scenario: scenario whose reference a law of the package follows
+        scenario: scenario with a law of the package
         paths: gains that may change, such as 'controller.torque_gain'; default: all gains of the law
 
     Returns:
         the gains and their evidence; None without such gains, or where no run has a tracking number
     """
-    centre = {path: gain for path, gain in drawn_settings(scenario).items() if not paths or path in paths}
-    if not centre or not scenario.follows_reference:
+    centre = {path: gain for path, gain in gains_together(scenario).items() if not paths or path in paths}
+    if not centre:
         return None
+    # A walk takes longer: it is judged on its own device.
+    count = len(FACTORS) if scenario.follows_reference else 1
     known = {path: number_at(scenario, path) for path in scenario.links if path.startswith("controller.")}
     devices = [
         {**known, **{path: sizes[device] * number_at(scenario, path) for path, sizes in DEVICES.items()}}
-        for device in range(len(FACTORS))
+        for device in range(count)
     ]
     best = JointGains(centre, np.inf, np.inf)
     for _ in range(ROUNDS):
@@ -68,7 +70,7 @@ def joint_gains(scenario: Scenario, paths: Collection[str] = ()) -> JointGains |
             }
             for row in product(FACTORS, repeat=len(centre))
         ]
-        runs = [Change(OTHER_GAINS, "law", {**device, **gains}, scenario) for gains in sets for device in devices]
+        runs = [Change(JOINT_GAINS, "law", {**device, **gains}, scenario) for gains in sets for device in devices]
         left = np.reshape(excesses(runs), (-1, len(devices)))
         worst = left.max(axis=1)
         # Sets that suffice on each device come first.

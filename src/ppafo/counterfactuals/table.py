@@ -4,7 +4,6 @@ import contextlib
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -12,14 +11,11 @@ from ppafo.counterfactuals.changes import Change
 from ppafo.engine.compilers import Effort
 from ppafo.errors import PpafoError
 from ppafo.metrics import metric_kind
-from ppafo.metrics.metric import Floats
 from ppafo.model.columns import at
-from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble import COMPLETED, lacking, run_ensemble
-from ppafo.simulation.ensemble.planning import columns_in_range
-from ppafo.simulation.numbers import declared_numbers, moving_together, present_numbers, with_numbers
+from ppafo.simulation.numbers import declared_numbers, moving_together, present_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking.rule import most_reversals, needed_metrics, smallest_change, tracking_excess
+from ppafo.simulation.tracking.rule import needed_metrics, tracking_excess
 
 _TIME_OF_OBJECT = 0.8
 """Processor time [s] after which no further run of a table with a Python object begins: single changes, and pairs."""
@@ -68,19 +64,8 @@ def _judged(base: Scenario, rows: Sequence[Mapping[str, float]]) -> list[float]:
     columns = {path: np.array([numbers.get(path, present[path]) for numbers in moved.values()]) for path in used}
     metrics = [name for name in needed_metrics(base) if (kind := metric_kind(name)) and not lacking(base, kind)]
     result = run_ensemble(base, columns, metrics, effort=Effort.QUICK)
-    left = _excess(base, result.metrics, columns)
+    judged = tracking_excess(base, columns, result.metrics)
+    # One that misses its task on purpose is no failure.
+    left = np.where(judged.on_purpose, np.minimum(judged.largest, 1.0), judged.largest)
     excess[list(moved)] = np.where((result.status == COMPLETED) & np.isfinite(left), left, math.inf)
     return excess.tolist()
-
-
-def _excess(base: Scenario, metrics: Mapping[str, Floats], columns: Mapping[str, Floats]) -> Floats:
-    """Largest tracking number over its limit of each run (runs,), at most 1 for one that misses its task on purpose."""
-    in_range = columns_in_range(base, columns)
-    varied = with_numbers(base, {path: column for path, column in in_range.items() if path not in TIMES})
-    most, duration = most_reversals(base), columns.get("run.duration")
-    if duration is not None:
-        varied = replace(varied, run=replace(varied.run, duration=duration))  # type: ignore[arg-type]
-        most = np.array([most_reversals(base, float(each)) for each in duration])  # type: ignore[assignment]
-    least = smallest_change(base) if base.follows_reference else 0.0
-    judged = tracking_excess(varied, metrics, most, least)
-    return np.where(judged.on_purpose, np.minimum(judged.largest, 1.0), judged.largest)

@@ -13,15 +13,14 @@ from typing import TYPE_CHECKING
 
 from ppafo.counterfactuals.changes import (
     AS_IT_IS,
-    OTHER_GAINS,
+    JOINT_GAINS,
     Change,
     changes_of,
-    drawn_gains,
-    drawn_settings,
     is_ideal,
     is_of_defaults,
     is_of_given,
 )
+from ppafo.counterfactuals.joint_gains import joint_gains
 from ppafo.counterfactuals.table import excesses
 from ppafo.errors import PpafoError
 from ppafo.loading import reloaded
@@ -40,10 +39,6 @@ if TYPE_CHECKING:
 
 _STRIDES_TRIED = 8.0
 """Number of strides in which the changes of a walk are compared; its remedy is simulated to the end."""
-_DRAWS, _DRAWS_OF_WALK = 40, 8
-"""Joint draws of gains, about the present ones and about the best of these; in a walk, which takes longer."""
-_WIDE, _NARROW = 16.0, 4.0
-"""Largest factor of a drawn gain, and near the best draw [-]."""
 _POINTS = 6
 """Number of parts of the way from the present numbers to a change that suffices; their ends are smaller steps."""
 _MARGIN = 0.9
@@ -127,15 +122,10 @@ def _first_strides(scenario: Scenario) -> Scenario:
 
 def _table(scenario: Scenario) -> list[Rated]:
     """Return the scenario as it is, and each change that is tried, with what it leaves."""
-    gains = drawn_settings(scenario)
-    draws = _DRAWS if scenario.follows_reference else _DRAWS_OF_WALK
-    changes = [Change(AS_IT_IS, "task", {}, scenario), *changes_of(scenario)]
-    drawn = drawn_gains(scenario, gains, draws, _WIDE) if gains else []
-    rated = _rated([*changes, *drawn])
-    of_gains = [each for each in rated if each[0].words == OTHER_GAINS]
-    nearest, left = min(of_gains, key=lambda each: each[1], default=rated[0])
-    if of_gains and 1.0 < left < math.inf:
-        rated += _rated(drawn_gains(scenario, nearest.numbers, draws, _NARROW))
+    rated = _rated([Change(AS_IT_IS, "task", {}, scenario), *changes_of(scenario)])
+    gains = joint_gains(scenario)
+    if gains is not None:
+        rated.append((Change(JOINT_GAINS, "law", gains.numbers, scenario), gains.excess))
     return rated
 
 
@@ -144,11 +134,11 @@ def _rated(changes: Sequence[Change]) -> list[Rated]:
 
 
 def _best_of_words(rated: Iterable[Rated]) -> list[Rated]:
-    """Return of the changes with the same words the first that follows, of other gains the best, else the nearest."""
+    """Return of the changes with the same words the first that follows, else the nearest."""
     best: dict[str, Rated] = {}
     for change, left in rated:
         before = best.get(change.words, (change, math.inf))[1]
-        if change.words not in best or (left < before and (before > 1.0 or change.words == OTHER_GAINS)):
+        if change.words not in best or left < before > 1.0:
             best[change.words] = (change, left)
     return list(best.values())
 
@@ -228,8 +218,8 @@ def _smallest_steps(changes: Sequence[Change]) -> Iterator[Change]:
 
 
 def _steps(change: Change) -> Iterator[Change]:
-    """Yield smaller steps of a change, in equal ratios where the sign stays; none of defaults and Python objects."""
-    if is_of_defaults(change) or change.base.controller.custom is not None:
+    """Yield smaller steps of a change; none of defaults, of gains that were chosen together, and of Python objects."""
+    if is_of_defaults(change) or change.words == JOINT_GAINS or change.base.controller.custom is not None:
         return
     present = present_numbers(change.base)
     for point in range(1, _POINTS):

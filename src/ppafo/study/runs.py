@@ -16,18 +16,13 @@ from ppafo.metrics import metric_kind
 from ppafo.metrics.settled import MOST_REVERSALS
 from ppafo.metrics.tracking import ONE_INSTANT
 from ppafo.progress import Progress, Report
-from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble import COMPLETED, lacking, run_ensemble
-from ppafo.simulation.ensemble.planning import absolute, columns_in_range
-from ppafo.simulation.numbers import with_numbers
+from ppafo.simulation.ensemble.planning import absolute
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking import most_reversals
 from ppafo.simulation.tracking.rule import (
     ON_PURPOSE,
     TrackingExcess,
-    command_turning,
     needed_metrics,
-    smallest_change,
     tracking_excess,
 )
 from ppafo.studies.distributions import Floats
@@ -233,14 +228,11 @@ def verdicts(
     - ``turning``: True where the command alone turns too often
     - ``beyond_reach``: requested torque that the actuator cannot give [N m]
     """
-    unknown, most = np.full(len(next(iter(columns.values()))), np.nan), most_reversals(scenario)
-    found, turning = TrackingExcess(unknown, unknown, np.zeros_like(unknown), unknown > 0.0), unknown > 0.0
     if set(needed_metrics(scenario)) & set(metrics):
-        in_range = columns_in_range(scenario, absolute(scenario, columns, gauge))
-        varied = {path: column for path, column in in_range.items() if path not in TIMES}
-        least = smallest_change(scenario) if scenario.follows_reference else 0.0
-        found = tracking_excess(with_numbers(scenario, varied), metrics, most, least)
-        turning = np.asarray(command_turning(scenario, metrics, most) > 1.0)
+        found = tracking_excess(scenario, absolute(scenario, columns, gauge), metrics)
+    else:
+        unknown = np.full(len(next(iter(columns.values()))), np.nan)
+        found = TrackingExcess(unknown, unknown, np.zeros_like(unknown), unknown > 0.0, unknown > 0.0)
     return {
         "excess": found.largest,
         # No controller can do better than a run whose reference is beyond reach on purpose.
@@ -248,7 +240,7 @@ def verdicts(
         FOLLOWS: found.follows,
         OSCILLATES: found.oscillates,
         ON_PURPOSE: found.on_purpose,
-        "turning": turning,
+        "turning": found.turns_often,
         "beyond_reach": found.beyond_reach,
     }
 

@@ -54,6 +54,9 @@ from ppafo.signals.meter import (
     Sample,
     start_up_of,
 )
+from ppafo.simulation.clock import TIMES
+from ppafo.simulation.ensemble.planning import columns_in_range
+from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.profiles import limits_of, profile_bounds, profile_parameters, profile_values
 from ppafo.simulation.scenario import Scenario
 
@@ -517,12 +520,14 @@ class TrackingExcess(NamedTuple):
     With ``largest`` up to 1 the run follows its reference, with ``oscillation`` up to 1 its loop does not oscillate.
     ``beyond_reach`` [N m] is the torque of the reference that the actuator cannot give, which the limits allow in part.
     A run that misses its reference for that alone, as its scenario announces, is ``on_purpose``: it does not follow.
+    ``turns_often`` is true where the command alone turns too often.
     """
 
     largest: Floats
     oscillation: Floats
     beyond_reach: Floats
     on_purpose: NDArray[np.bool_]
+    turns_often: NDArray[np.bool_]
 
     @property
     def follows(self) -> Floats:
@@ -535,17 +540,23 @@ class TrackingExcess(NamedTuple):
         return np.where(np.isnan(self.oscillation), np.nan, self.oscillation > 1.0)
 
 
-def tracking_excess(
-    scenario: Scenario, metrics: Mapping[str, Floats], most_reversals: float, least: float
-) -> TrackingExcess:
-    """Numbers of each run by which its tracking is judged, divided by their limits.
+def tracking_excess(base: Scenario, columns: Mapping[str, Floats], metrics: Mapping[str, Floats]) -> TrackingExcess:
+    """Numbers of each run of an ensemble by which its tracking is judged, divided by their limits.
 
-    Numbers of the scenario may be arrays (runs,). ``metrics`` are the available ``needed_metrics``; ``most_reversals``
-    is the number of command reversals above which the loop oscillates; ``least`` is the ``smallest_change``.
+    Arguments:
+        base: scenario of the ensemble
+        columns: varied numbers [SI] by path, each (runs,)
+        metrics: the available ``needed_metrics`` of the runs, each (runs,)
     """
+    in_range = columns_in_range(base, columns)
+    scenario = with_numbers(base, {path: column for path, column in in_range.items() if path not in TIMES})
+    most: Any = most_reversals(base)
+    if (durations := in_range.get("run.duration")) is not None:
+        scenario = replace(scenario, run=replace(scenario.run, duration=durations))  # type: ignore[arg-type]
+        most = np.array([most_reversals(base, float(duration)) for duration in durations])
     none = np.full(next(iter(metrics.values())).size, np.nan)
-    turning = command_turning(scenario, metrics, most_reversals)
-    counted = np.isfinite(metrics.get(REVERSALS, none)) & np.isfinite(most_reversals)
+    turning = command_turning(scenario, metrics, most)
+    counted = np.isfinite(metrics.get(REVERSALS, none)) & np.isfinite(most)
     numbers = {name: metrics.get(name, none) for name in needed_metrics(scenario)}
     with np.errstate(divide="ignore", invalid="ignore"):
         if not scenario.follows_reference:
@@ -568,8 +579,8 @@ def tracking_excess(
             known = (asks & (requested > 0.0)) | (~asks & np.isfinite(peak) & (limit > 0.0))
             known_turning = np.where(counted | known, turning, np.nan)
             zeros = np.zeros(none.size)
-            return TrackingExcess(np.where(known, excess, np.nan), known_turning, zeros, zeros > 0.0)
-        parts = settled_parts(scenario, numbers, least)
+            return TrackingExcess(np.where(known, excess, np.nan), known_turning, zeros, zeros > 0.0, turning > 1.0)
+        parts = settled_parts(scenario, numbers, smallest_change(base))
         is_switched = only_switches(scenario, scenario.law)
         found = [excess_of_part(part, is_switched) for part in parts]
         explained = bool(scenario.beyond_reach) & misses_for_reach(scenario, parts, turning)
@@ -584,4 +595,5 @@ def tracking_excess(
         oscillation=np.where(counted | known, np.fmax.reduce([turning, *swings]), np.nan),
         beyond_reach=parts[0].beyond_reach + np.zeros(none.size),
         on_purpose=(largest > 1.0) & explained,
+        turns_often=turning > 1.0,
     )
