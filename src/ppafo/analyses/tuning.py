@@ -471,7 +471,7 @@ def solve_tuning(
 
     # The search begins with the better of the gains before and those that an ensemble about them chooses together.
     together = ask.joint_gains(scenario, problem.before) if scenario.follows_reference else None
-    firsts = [problem.before, *([] if together is None else [{**problem.before, **together.numbers}])]
+    firsts = [problem.before, *([] if together is None else [{**problem.before, **together[0].numbers}])]
     rows = [[gain.range.fraction(gains[gain.place.path]) for gain in problem.searched] for gains in firsts]
     starts = search(costs, rows[int(np.argmin(costs(np.clip(rows, 0.0, 1.0))))], effort)
     before, after = map(evaluated, (problem.before, problem.gains(starts[0].fractions)))

@@ -45,8 +45,8 @@ from ppafo.simulation.tracking.rule import only_switches
 Group = Literal["law", "start", "device", "sensors", "load", "task"]
 """Part of a scenario that a change concerns."""
 AS_IT_IS, JOINT_GAINS, _DEFAULT = "as it is", "with all gains chosen together", "with the default"
-_IDEAL_WORDS = ("without", "with a quicker", "with a straight", "with initial", "with gas", "with the sign")
-"""First words of changes that make a property ideal."""
+IDEAL_WORDS = ("without", "with a quicker", "with a straight", "with initial", "with gas", "with the sign")
+"""First words of changes that take away a property, rather than choose a better one."""
 SLOWER_REFERENCE = "with a slower reference"
 _DURATION = "run.duration"
 _IDEAL = 1.0e-4
@@ -129,11 +129,6 @@ class Change(NamedTuple):
     base: Scenario
     overrides: tuple[str, ...] = ()
     is_of_command: bool = False
-
-
-def is_ideal(change: Change) -> bool:
-    """Return whether a change takes away a property, rather than choose a better one."""
-    return change.words.startswith(_IDEAL_WORDS)
 
 
 def is_of_defaults(change: Change) -> bool:

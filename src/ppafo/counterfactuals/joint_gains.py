@@ -2,12 +2,11 @@
 
 from collections.abc import Collection
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 
 from ppafo.counterfactuals.changes import JOINT_GAINS, Change, gains_together
-from ppafo.counterfactuals.table import excesses
+from ppafo.counterfactuals.table import Rated, excesses
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import Scenario
 
@@ -26,56 +25,41 @@ DEVICES = {
 """Numbers of the nominal, a light, and a heavy and weak device, divided by the nominal ones [-]."""
 
 
-class JointGains(NamedTuple):
-    """Gains chosen together, and their evidence.
+def joint_gains(scenario: Scenario, paths: Collection[str] = ()) -> Rated | None:
+    """Return the gains of a scenario chosen together, as one change, and what it leaves on the nominal device [-].
 
-    ``numbers``: gains [SI] by path, of three significant digits, as they are printed
-    ``excess``: largest tracking number over its limit of the nominal device [-]; up to 1 the run follows
-    ``worst``: the same of the worst of the three devices
-    """
-
-    numbers: dict[str, float]
-    excess: float
-    worst: float
-
-
-def joint_gains(scenario: Scenario, paths: Collection[str] = ()) -> JointGains | None:
-    """Return the gains of a scenario chosen together, of which the worst of three devices follows best; of a walk one.
-
-    The law knows the nominal device. Where no gains suffice on all three, those that suit the nominal one are chosen.
+    Chosen is the set of which the worst of three devices follows best; the law knows the nominal one. Where no set
+    suffices on all three, the one that suits the nominal device is chosen. A walk is judged on its own device alone.
 
     Arguments:
         scenario: scenario with a law of the package
         paths: gains that may change, such as 'controller.torque_gain'; default: all gains of the law
 
     Returns:
-        the gains and their evidence; None without such gains, or where no run has a tracking number
+        the change, whose numbers have three significant digits as they are printed, and the largest tracking number
+        over its limit; None without such gains, or where no run has a tracking number
     """
-    centre = {path: gain for path, gain in gains_together(scenario).items() if not paths or path in paths}
-    if not centre:
+    gains = {path: gain for path, gain in gains_together(scenario).items() if not paths or path in paths}
+    if not gains:
         return None
-    # A walk takes longer: it is judged on its own device.
-    count = len(FACTORS) if scenario.follows_reference else 1
-    known = {path: number_at(scenario, path) for path in scenario.links if path.startswith("controller.")}
+    # What the law believes of its device stays when the device differs.
+    believed = {path: number_at(scenario, path) for path in scenario.links if path.startswith("controller.")}
     devices = [
-        {**known, **{path: sizes[device] * number_at(scenario, path) for path, sizes in DEVICES.items()}}
-        for device in range(count)
+        {**believed, **{path: sizes[device] * number_at(scenario, path) for path, sizes in DEVICES.items()}}
+        for device in range(3 if scenario.follows_reference else 1)
     ]
-    best = JointGains(centre, np.inf, np.inf)
     for _ in range(ROUNDS):
         sets = [
-            {
-                path: float(f"{gain * factor:.3g}")
-                for (path, gain), factor in zip(best.numbers.items(), row, strict=True)
-            }
-            for row in product(FACTORS, repeat=len(centre))
+            {path: float(f"{gain * factor:.3g}") for (path, gain), factor in zip(gains.items(), row, strict=True)}
+            for row in product(FACTORS, repeat=len(gains))
         ]
-        runs = [Change(JOINT_GAINS, "law", {**device, **gains}, scenario) for gains in sets for device in devices]
+        runs = [Change(JOINT_GAINS, "law", {**device, **chosen}, scenario) for chosen in sets for device in devices]
         left = np.reshape(excesses(runs), (-1, len(devices)))
         worst = left.max(axis=1)
         # Sets that suffice on each device come first.
-        chosen = int(np.argmin(np.where(worst <= 1.0, worst, 1.0 + left[:, 0])))
-        best = JointGains(sets[chosen], float(left[chosen, 0]), float(worst[chosen]))
-        if chosen == 0 or best.worst <= ENOUGH:
+        best = int(np.argmin(np.where(worst <= 1.0, worst, 1.0 + left[:, 0])))
+        gains = sets[best]
+        if best == 0 or worst[best] <= ENOUGH:
             break
-    return best if np.isfinite(best.excess) else None
+    change = Change(JOINT_GAINS, "law", gains, scenario)
+    return (change, float(left[best, 0])) if np.isfinite(left[best, 0]) else None

@@ -21,6 +21,8 @@ _TIME_OF_OBJECT = 0.8
 """Processor time [s] after which no further run of a table with a Python object begins: single changes, and pairs."""
 _ANY_NUMBER = "gas.temperature"
 """Path of a number that every scenario has, as the column of runs that vary none."""
+Rated = tuple[Change, float]
+"""Change, and the largest tracking number over its limit that it leaves [-]: up to 1 the run follows."""
 
 
 def excesses(changes: Sequence[Change]) -> list[float]:

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING
 
 from ppafo.counterfactuals.changes import (
     AS_IT_IS,
+    IDEAL_WORDS,
     JOINT_GAINS,
     Change,
     changes_of,
-    is_ideal,
     is_of_defaults,
     is_of_given,
 )
 from ppafo.counterfactuals.joint_gains import joint_gains
-from ppafo.counterfactuals.table import excesses
+from ppafo.counterfactuals.table import Rated, excesses
 from ppafo.errors import PpafoError
 from ppafo.loading import reloaded
 from ppafo.simulation.numbers import present_numbers, with_numbers
@@ -55,9 +55,6 @@ _CHOSEN = 2.0
 """Factor on what a better choice leaves, by which it comes after a property made ideal [-]."""
 _NEARER = 0.5
 """Remaining excess over the original one, below which the best change that does not suffice is named [-]."""
-
-Rated = tuple[Change, float]
-"""Change, and the largest tracking number over its limit that it leaves [-]: up to 1 the run follows."""
 
 
 @in_units(lambda result: result.scenario.device.shown)
@@ -124,9 +121,7 @@ def _table(scenario: Scenario) -> list[Rated]:
     """Return the scenario as it is, and each change that is tried, with what it leaves."""
     rated = _rated([Change(AS_IT_IS, "task", {}, scenario), *changes_of(scenario)])
     gains = joint_gains(scenario)
-    if gains is not None:
-        rated.append((Change(JOINT_GAINS, "law", gains.numbers, scenario), gains.excess))
-    return rated
+    return rated if gains is None else [*rated, gains]
 
 
 def _rated(changes: Sequence[Change]) -> list[Rated]:
@@ -148,7 +143,7 @@ def _order(lowest: Mapping[str, float], evident: Collection[str], change: Change
 
     ``evident`` are the words of changes for which the run has evidence; without it, a load is part of the task.
     """
-    left = lowest[change.words] * (1.0 if is_ideal(change) else _CHOSEN)
+    left = lowest[change.words] * (1.0 if change.words.startswith(IDEAL_WORDS) else _CHOSEN)
     if is_of_given(change):
         return -1.0, left
     # Everything follows a reference that is small enough, and stays without a load.

@@ -94,8 +94,14 @@ def gains_of(scenario: Scenario) -> Gains | None:
     # A load moves the chambers of a joint that nothing leads, also of one whose torque is controlled.
     of_joint = any(gain.computed for gain in gains) and not isinstance(scenario.motion, PrescribedMotion)
     loads = [effect.section for effect in effects_of(scenario.device) if load_torque in effect.laws]
-    unit, unknown = CONTROLLED[controlled].plain_unit, tuple(loads) if of_joint else ()
-    return Gains(gains, loop.rate, loop.dead_time, unit, unknown, light)
+    return Gains(
+        gains,
+        loop.rate,
+        loop.dead_time,
+        CONTROLLED[controlled].plain_unit,
+        unknown_loads=tuple(loads) if of_joint else (),
+        lightness=light,
+    )
 
 
 @in_units(lambda scenario, _varied: scenario.device.shown)
