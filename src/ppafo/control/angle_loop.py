@@ -45,7 +45,9 @@ SHARE_OF_SPRING = 0.5
 LIGHT = 0.7
 """Largest theta sqrt(S/I) [-] at which these gains are stable without friction, for 0.7 to 1.3 times R."""
 LEAST_TOLERANCE = math.radians(0.5)
-"""Smallest tolerance [rad]: about the play of an orthosis on its wearer, for every drive."""
+"""Tolerance [rad] of a joint with a wide range: about the play of an orthosis on its wearer, for every drive."""
+ALLOWED_AT_REST = 0.0025
+"""Error at rest over the range of a joint that its verdict allows at least [-]: 5 % of a way of 5 %."""
 STEPS_OF_TOLERANCE = 2.0
 """Smallest tolerance in resolutions of the angle sensor, or in doubled standard deviations of the sensor noise."""
 NOISE_IN_FILTER = 6.0
@@ -65,8 +67,9 @@ class Joint(NamedTuple):
     """Joint dynamics for the gains of an angle controller: moving parts on the gas spring of the chambers.
 
     ``inertia`` [kg m^2], gas ``stiffness`` [N m/rad], ``shut_in`` [N m/rad] between closed valves at work, viscous
-    ``damping`` [N m s/rad], kinetic ``friction`` [N m], ``static_friction`` [N m], typical ``travel`` per move [rad],
-    largest ``gravity`` torque [N m], ``resolution`` [rad] and ``noise`` [rad] of the angle sensor.
+    ``damping`` [N m s/rad], kinetic ``friction`` [N m], ``static_friction`` [N m], ``span`` between the stops [rad],
+    typical ``travel`` per move [rad], largest ``gravity`` torque [N m], ``resolution`` [rad] and ``noise`` [rad] of the
+    angle sensor.
     """
 
     inertia: float
@@ -75,6 +78,7 @@ class Joint(NamedTuple):
     damping: float
     friction: float
     static_friction: float
+    span: float
     travel: float
     gravity: float
     resolution: float
@@ -116,9 +120,13 @@ def torque_lag(loop: TorqueLoop) -> float:
 
 
 def tolerance(joint: Joint) -> float:
-    """Angle error [rad] within which the load is not adapted: 0.5 deg, or the sensor resolution if coarser."""
+    """Angle error [rad] within which the load is not adapted.
+
+    A joint rests anywhere within twice this, which is the least error that its verdict allows. It is at most 0.5 deg,
+    and at least what the sensor resolves.
+    """
     unseen = STEPS_OF_TOLERANCE * max(joint.resolution, 2.0 * joint.noise)
-    return max(LEAST_TOLERANCE, unseen)
+    return max(min(LEAST_TOLERANCE, 0.5 * ALLOWED_AT_REST * joint.span), unseen)
 
 
 def rest_distance(loop: TorqueLoop, joint: Joint) -> float:

@@ -87,8 +87,8 @@ _RATES, _TOP_RATE = (4.0, 10.0, 30.0, 100.0), 2.0e3
 """Rates of a controller divided by the present one [-], and the highest one [Hz]."""
 _VOLUMES = (0.25, 4.0)
 """Dead volumes divided by the present ones [-]."""
-_SPEEDS, _SIZES = (0.5, 0.25, 0.1, 0.05), (0.8, 0.5, 0.25, 0.1, 0.01, 1.0e-3)
-"""Speed and size of the reference divided by the present ones [-]."""
+_SPEEDS, _SIZES = (0.5, 0.25, 0.1, 0.05), (0.8, 0.5, 0.25, 0.1)
+"""Speed and size of the reference divided by the present ones [-]; anything follows a reference of almost nothing."""
 _LONGER = 2.0
 """Duration of a longer run divided by the present one [-]."""
 _GAINS = (
@@ -306,8 +306,12 @@ def _easier_tasks(scenario: Scenario, present: Mapping[str, float]) -> Iterator[
         return
     profile = PROFILES[scenario.reference.kind]
     of = {item.name: (f"reference.{item.name}", item.unit) for item in profile.quantities}
-    # Knots that a table does not use lie far away.
-    times = [path for path, unit in of.values() if unit == "s" and 0.0 < present.get(path, 0.0) < _UNUSED]
+    # Knots that a table does not use lie far away; a ramp that begins later is no slower one.
+    times = [
+        path
+        for path, unit in of.values()
+        if unit == "s" and 0.0 < present.get(path, 0.0) < _UNUSED and not path.endswith("ramp_start")
+    ]
     rates = [path for path, unit in of.values() if unit == "Hz" and present.get(path)]
     length = math.fsum(present[path] for path in times if ".ramp_" in path)
     length = max(length, *(present[path] for path in times), *(2.0 / present[path] for path in rates), 0.0)

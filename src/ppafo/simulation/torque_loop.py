@@ -498,6 +498,7 @@ def set_joint(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> Non
         damping=settings["friction.viscous_damping"],
         friction=settings["friction.dynamic_torque"],
         static_friction=settings["friction.static_torque"],
+        span=lane.stops.angle_max - lane.stops.angle_min,
         travel=0.0 if parts.controls_torque else settings["controller.error_limit"],
         gravity=weight,
         resolution=settings["sensors.angle_resolution"],

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, Executor, Future
 from functools import cache
+from hashlib import sha256
 from itertools import islice
 from queue import SimpleQueue
 from secrets import token_hex
@@ -87,11 +88,12 @@ def computed_by(
             error = CancelledError("cancelled") if future.cancelled() else future.exception()
             if error is None:
                 match future.result():
-                    case (str(answered), answer) if answered == mark:
-                        yield number, answer
+                    case (str(seal), bytes(content)) if seal == sha256(mark.encode() + content).hexdigest():
+                        yield number, pickle.loads(content)
                     case foreign:
-                        kind = type(foreign).__name__
-                        raise StudyError(f"executor: answers block {number} with a {kind} that is not its result")
+                        raise StudyError(
+                            f"executor: answers block {number} with a {type(foreign).__name__} that is not its result"
+                        )
                 for following in islice(numbers, 1):
                     submit(following)
             elif isinstance(error, PpafoError):
@@ -108,8 +110,8 @@ def computed_by(
             future.cancel()
 
 
-def _computed(sent: bytes, block: Any, version: str, mark: str) -> tuple[str, Any]:
-    """Return the mark of a submission with the answer to its block, on a worker."""
+def _computed(sent: bytes, block: Any, version: str, mark: str) -> tuple[str, bytes]:
+    """Return the answer to a block as bytes, on a worker, behind their hash with the mark of the submission."""
     _end_with_caller()
     if version != __version__:
         raise StudyError(f"executor: a worker has ppafo {__version__}, not {version}; install the same version there")
@@ -121,7 +123,8 @@ def _computed(sent: bytes, block: Any, version: str, mark: str) -> tuple[str, An
             f"executor: a worker cannot load the study: {error}; install this module there, or send it by means of the "
             "executor, such as upload_file of Dask's Client"
         ) from error
-    return mark, work(block)
+    content = pickle.dumps(work(block))
+    return sha256(mark.encode() + content).hexdigest(), content
 
 
 @cache

@@ -77,6 +77,7 @@ JOINT = Joint(
     damping=4.0e-3,
     friction=0.02,
     static_friction=0.0,
+    span=1.9,
     travel=0.1,
     gravity=0.3,
     resolution=0.0,
@@ -107,7 +108,8 @@ def test_static_friction_raises_the_stiffness_up_to_a_cap() -> None:
 
 def test_a_coarse_sensor_widens_what_counts_as_there_and_as_motion() -> None:
     coarse = JOINT._replace(resolution=math.radians(0.5))
-    assert tolerance(JOINT) == pytest.approx(math.radians(0.5))
+    assert tolerance(JOINT) == pytest.approx(0.5 * 0.0025 * JOINT.span)
+    assert tolerance(JOINT._replace(span=10.0)) == pytest.approx(math.radians(0.5))
     assert tolerance(coarse) == pytest.approx(math.radians(1.0))
     assert rest_distance(LOOP, coarse) > coarse.resolution > rest_distance(LOOP, JOINT)
     assert rate_filter(LOOP, coarse) > rate_filter(LOOP, JOINT)

@@ -230,8 +230,8 @@ def _flung_at_start(case: Case) -> str:
     if case.oscillates or (load := _load_at(case, start)) is None:
         return ""
     lacking = load - static_torque(device)(start, float(initial.pressure_1), float(initial.pressure_2))
-    # A lack of torque turns the joint to smaller angles.
-    deviation = float(np.max((reference - angle) * np.sign(lacking)))
+    # A lack of torque turns the joint to smaller angles; later the reference moves away, not the joint.
+    deviation = float(np.max(((reference - angle) * np.sign(lacking))[reference == reference[0]]))
     if abs(lacking) <= float(device.friction.static_torque) or deviation <= _FLUNG * case.settled.wanted_change:
         return ""
     carried, needed = level_text("N m", load - lacking), level_text("N m", load)

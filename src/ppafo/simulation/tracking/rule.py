@@ -216,14 +216,14 @@ def task_parts(scenario: Scenario, recording: Recording) -> list[SettledPart]:
     for part, of in zip(
         settled_parts(scenario, numbers, smallest_change(scenario)), (sums.part, sums.before, sums.worst), strict=True
     ):
-        start, since, end = int(of.start), int(of.since), int(of.end)
+        since, end = int(of.since), int(of.end)
         is_last = of is sums.part
         single = SettledPart._make(each.item() if isinstance(each, np.ndarray | np.generic) else each for each in part)
         found.append(
             single._replace(
                 first=of.since,
                 last=of.end,
-                start=float(time[since if is_last else start]),
+                start=float(time[since]),
                 end=0.0 if is_last else float(time[end]),
                 duration=float(time[end] - time[since]),
                 command_reversal_rate=float(numbers["settled_reversals"]) if is_last else 0.0,

@@ -298,9 +298,7 @@ def _following(case: Case, _turning: float, _rate: float) -> Tracking:
         errors.append(f"{each} {error_text}" + (f" ({limit_text} allowed{reason})" if is_limited else ""))
     overshoot, way = settled.peak - settled.wanted_change, ""
     if scenario.follows_reference and not case.only_switches and overshoot > LARGEST_SHARE * settled.wanted_change:
-        limit = (LARGEST_PEAK - 1.0) * settled.wanted_change
-        found, allowed = (change_text(controlled.name, each) for each in (overshoot, limit))
-        way = f"; on the way it overshoots by {found} ({allowed} allowed)"
+        way = f"; on the way it overshoots by {change_text(controlled.name, overshoot)}"
     # The interval stands before the errors: metrics of the same names cover the whole run.
     said = f"the {controlled.words} follows its reference;{since}: {', '.join(errors)}{way}"
     # A reference just beyond reach is missed by no more than is allowed.

@@ -141,8 +141,8 @@ from ppafo.study.executing import _computed
 if __name__ == "__main__":
     pool = ProcessPoolExecutor(4, get_context("fork"))
     block = pickle.dumps(eval), "__import__('os').getpid()"
-    mark, worker = pool.submit(_computed, *block, ppafo.__version__, "").result()
-    print(worker, *pool._processes, flush=True)
+    seal, content = pool.submit(_computed, *block, ppafo.__version__, "").result()
+    print(pickle.loads(content), *pool._processes, flush=True)
     time.sleep(60)
 """
 
