@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ppafo.counterfactuals import verdict_of
+from ppafo.counterfactuals import table, verdict_of
 from ppafo.counterfactuals.changes import Change, changes_of
 from ppafo.counterfactuals.table import excesses
 from ppafo.loading import load_scenario
@@ -85,7 +85,11 @@ def test_each_delay_of_a_loop_is_in_one_list() -> None:
     ],
     ids=["late sensor", "wrong sign", "soft object"],
 )
-def test_what_is_named_makes_the_run_follow(scenario: Scenario, cause: str, other: str) -> None:
+def test_what_is_named_makes_the_run_follow(
+    scenario: Scenario, cause: str, other: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # On a slow computer too, all changes of a Python object are tried.
+    monkeypatch.setattr(table, "_TIME_OF_OBJECT", 60.0)
     verdict = verdict_of(simulate(scenario))
     assert cause in verdict.cause
     assert other not in verdict.cause

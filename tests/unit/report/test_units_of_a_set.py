@@ -71,7 +71,7 @@ def test_the_unit_of_a_controller_setting_or_a_sensor_is_of_that_number_alone(tm
         assert given is not None
         assert "tolerance 0.5 deg (given)" in given.sentence
     remark = remark_on_following_gains(ppafo.load_scenario("swing-foot-angle"), ["actuator.torque_constant"])
-    assert "controller.tolerance=0.5 deg'" in remark
+    assert "controller.tolerance=0.1375 deg'" in remark
     assert " rad'" not in remark
     file = tmp_path / "foot.toml"
     shipped = resources.files("ppafo.scenarios").joinpath("swing-foot-angle.toml").read_text(encoding="utf-8")
