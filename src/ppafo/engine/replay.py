@@ -3,6 +3,7 @@
 Between two changes of the inputs a run proceeds without interruption, so that constant inputs cost only a few calls.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -10,10 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ppafo.control.kind import ProfileKind
+from ppafo.engine.in_python import functions_of
 from ppafo.engine.lane_rows import lanes_of
 from ppafo.engine.lanes import Batch, BatchResult, Floats, begin_block, join_results
-from ppafo.engine.rows import group_of, leaf_paths, leaves, of_each, row_numbers
-from ppafo.engine.step.lane import LaneTiming
+from ppafo.engine.rows import group_of, leaves, of_each, row_numbers
+from ppafo.model.ports import at_valve
 
 COMMAND = "result.command"
 """Path of the present command among the states of a program."""
@@ -56,7 +58,10 @@ class StepInputs:
     parameters: Mapping[str, Floats]
     """Values of each step (steps,) [SI] by the path of a parameter such as ``plant.supply_pressure``."""
     earlier: Floats | None = None
-    """Commands of the steps before the first (steps,) [-], the first of which has always stood; None without any."""
+    """Commands of the steps before the first (steps,) [-], the first of which has always stood; None without any.
+
+    A first one that is not a number stands for the command that holds the pressures at the start, 0 of most valves.
+    """
 
 
 def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
@@ -74,14 +79,15 @@ def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
     # Steps at which any input differs from the step before, the first step among them.
     starts = [0, *(np.flatnonzero((np.diff(table, axis=1) != 0.0).any(axis=0)) + 1).tolist()]
     ends = [*starts[1:], batch.clock.step_count]
-    results = []
+    results, before = [], None
     if inputs.earlier is not None:
-        batch = replace(batch, states=_with_valves_after(batch, inputs.earlier))
+        states, before = _started(batch, inputs.earlier)
+        batch = replace(batch, states=states)
     for runs_of_block in blocks:
         parameters, states = batch.parameters[:, runs_of_block], batch.states[:, runs_of_block]
         block = begin_block(replace(batch, parameters=parameters, states=states))
-        if inputs.earlier is not None:
-            block.set_earlier(inputs.earlier)
+        if before is not None:
+            block.set_earlier(before[:, runs_of_block])
         for start, end in zip(starts, ends, strict=True):
             if inputs.command is not None:
                 block.states[command_row] = inputs.command[start]
@@ -92,29 +98,49 @@ def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
     return join_results(results)
 
 
-def _with_valves_after(batch: Batch, earlier: Floats) -> Floats:
-    """Return the initial states (rows, runs) of a batch with valves as they are after earlier commands (steps,)."""
+def _started(batch: Batch, earlier: Floats) -> tuple[Floats, Floats]:
+    """Return initial states (rows, runs) with valves and effects as after earlier commands (steps,), and these.
+
+    The commands (steps, runs) have for a first one that is not known that which holds the pressures at the start.
+    """
     program, delay = batch.program, batch.clock.command_delay
+    valve, states = program.valve, batch.states.copy()
     # The last ones have not arrived yet.
     arrived = earlier[: max(1, earlier.size - delay)]
     changes = np.flatnonzero(np.diff(arrived)) + 1
-    commands = arrived[[0, *changes]].tolist()
+    rows_at_start = dict[str, Any]()
+    # Laws of effects act on commands and in the valve, as in a step.
+    linked = functions_of(program, rows_at_start)
+    at_port, settle, next_event, advance = map(linked.of, (at_valve, valve.settle, valve.next_event, valve.advance))
 
-    def valve_at_start(valve: Any, timing: LaneTiming) -> Any:
+    def at_start(rows: Mapping[str, Any]) -> tuple[Any, ...]:
+        rows_at_start.update(rows)
+        timing, state, parameters = rows["timing"], rows["state"], rows["valve"]
+        pressures = program.actuator.pressures(rows["plant"], state.angle, state.mass_1, state.mass_2)
+        first = float(arrived[0])
+        if math.isnan(first):
+            first = 0.0 if valve.command_for is None else valve.command_for(parameters, 0.0, *pressures)
         begins = (changes - earlier.size + delay + timing.command_lag) * timing.step
-        state, time = program.valve.state(), _LONG_AGO
-        for command, end in zip(commands, [*begins.tolist(), 0.0], strict=True):
+        valve_state, time = valve.state(), _LONG_AGO
+        for command, end in zip([first, *arrived[changes].tolist()], [*begins.tolist(), 0.0], strict=True):
+            for name, kind in program.stated.items():
+                if kind.settle is not None:
+                    before = rows_at_start[f"{name}_state"]
+                    rows_at_start[f"{name}_state"] = kind.settle(rows[name], before, command)
+            asked = at_port(command)
+            if time == _LONG_AGO and valve.holding is not None:
+                valve_state, time = valve.holding(parameters, asked, *pressures), end
             while time < end:
-                settled = program.valve.settle(valve, state, command, time)
-                event = program.valve.next_event(valve, settled, command, time)
+                settled = settle(parameters, valve_state, asked, time)
+                event = next_event(parameters, settled, asked, time)
                 until = min(end, max(event, time + _LEAST_PART))
-                _, state = program.valve.advance(valve, state, command, time, until - time)
+                _, valve_state = advance(parameters, valve_state, asked, time, until - time)
                 time = until
-        return state
+        return first, valve_state, *(rows_at_start[name] for name in program.effect_states)
 
-    groups, states = program.parameter_rows(), batch.states.copy()
-    given = (group_of(name, groups, batch.parameters) for name in ("valve", "timing"))
-    rows, numbers = row_numbers(program.state_rows()), leaves(of_each(valve_at_start, *given))
-    for path, values in zip(leaf_paths(program.valve.state, "valve_state"), numbers, strict=True):
-        states[rows[path]] = values
-    return states
+    tables = (program.parameter_rows(), batch.parameters), (program.state_rows(), states)
+    first, *begun = of_each(at_start, {name: group_of(name, *table) for table in tables for name in table[0]})
+    kinds, numbers = {"valve_state": valve.state, **program.effect_states}, row_numbers(program.state_rows())
+    for path, values in zip(row_numbers(kinds), leaves(begun), strict=True):
+        states[numbers[path]] = values
+    return states, np.where(np.isnan(earlier[:, None]), first, earlier[:, None])

@@ -30,7 +30,7 @@ from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.report.kind import Kind
-from ppafo.signals.faults import correlated_noise_of, isolated_samples
+from ppafo.signals.faults import isolated_samples
 from ppafo.signals.recording import Floats, Recording
 from ppafo.simulation.numbers import declared_numbers, number_at, other_form, with_numbers
 from ppafo.simulation.recorded.channels import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
@@ -284,7 +284,7 @@ def record_of(agreement: RecordingAgreement) -> Record:
             words.append(f"{channel.channel} {said}")
             has_few = has_few and is_isolated and float(is_wrong.mean()) < _FEW_OUTLIERS
             good[row] -= is_wrong
-            noise[row] = max(noise_in(values[~is_wrong], channel.full_range), correlated_noise_of(residuals[~is_wrong]))
+            noise[row] = noise_in(values[~is_wrong], channel.full_range)
     record = Record(
         agreement=agreement,
         channels=tuple(channel.channel for channel in compared),
@@ -417,7 +417,8 @@ class Cause:
     is a change too. ``unit``: unit of the changed parameter.
 
     ``size``: magnitude, for ratios its logarithm. ``slope``: derivative of all errors by it, divided by noise [-].
-    ``left``: largest RMS error of any channel divided by its noise [-] under the cause. ``same``: other causes that the
+    ``left``: largest RMS error of any channel divided by its noise [-] under the cause. ``delay``: common delay [s] of
+    the measurement beside a cause that was found, 0 if the cause is a delay itself. ``same``: other causes that the
     recordings cannot distinguish from this one; of the nearest cause, the two next ones.
     """
 
@@ -435,6 +436,7 @@ class Cause:
     gain: float = 0.0
     left: float = math.nan
     slope: Floats = field(default_factory=lambda: np.zeros(0))
+    delay: float = 0.0
     same: "tuple[Cause, ...]" = ()
 
     @property
@@ -803,18 +805,14 @@ def _in_other_unit(agreements: Sequence[RecordingAgreement]) -> Cause | None:
         except PpafoError:
             return None
         pairs += zip(as_read.channels, other.channels, strict=True)
-    for before, after in pairs:
-        is_better = before.passes or after.rms < _LESS * before.rms
-        explains = after.passes or after.rms**2 < (1.0 - EXPLAINED_FRACTION) * after.variation**2
-        if not (is_better and explains):
-            return None
-    gain = sum(
-        2.0 * len(before.values) * math.log(max(before.in_noise, 1.0) / max(after.in_noise, 1.0))
+    explains_all = all(
+        (before.passes or after.rms < _LESS * before.rms)
+        and (after.passes or after.rms**2 < (1.0 - EXPLAINED_FRACTION) * after.variation**2)
         for before, after in pairs
-        if before.channel in SENSORS
     )
     left, words = max(after.in_noise for _, after in pairs), f"times seem to be in {name}"
-    return Cause(name, words, lambda rate: ModelChange(clock=rate), size=_TIMES[name], gain=gain, left=left)
+    cause = Cause(name, words, lambda rate: ModelChange(clock=rate), size=_TIMES[name], left=left)
+    return cause if explains_all else None
 
 
 _Trial = tuple[Cause, ModelChange, float]
@@ -1048,14 +1046,15 @@ class CauseSearch:
             alike,
             key=lambda cause: (cause.name not in alone, not cause.at(cause.size).numbers, -cause.gain),
         )
-        return replace(first, same=tuple(rest))
+        # Without the cause, a delay stands for a part of it.
+        return replace(first, same=tuple(rest), delay=self.mended([first])[0].delay)
 
     def unexplained(self, tried: Sequence[Cause], kinds: str) -> Diagnosis:
         """Return the diagnosis without a cause, with the best of the causes ``tried``, of the ``kinds`` in words."""
         # Wrong samples are seen in themselves, whatever else is wrong; a misread unit is no hint beside others.
         hinting = [cause for cause in tried if not cause.is_of_unit and (cause.gain > 0.0 or cause.is_of_samples)]
         hints = sorted(
-            (replace(cause, left=left) for cause, left in zip(hinting, self.left_by(hinting), strict=True)),
+            self.mended(hinting),
             # Of those that leave the same, numbers of the set come first.
             key=lambda cause: (not cause.is_of_samples, float(f"{cause.left:.2g}"), not cause.numbers, cause.left),
         )
@@ -1063,14 +1062,14 @@ class CauseSearch:
         nearest = replace(alike[0], same=tuple(alike[1:])) if alike else None
         return Diagnosis(nearest=nearest, tried=len(tried), kinds=kinds)
 
-    def left_by(self, causes: Sequence[Cause]) -> list[float]:
-        """Return the largest RMS error of any channel that each cause leaves, divided by its noise [-].
+    def mended(self, causes: Sequence[Cause]) -> list[Cause]:
+        """Return each cause with the delay and the largest RMS error [noise] that a validation finds once it is mended.
 
-        It is what a validation finds once the cause is mended, with its rule for the common delay: none at its limit.
+        The common delay is by its rule: none at its limit, and none beside a cause that is a delay itself.
         """
-        left = list[float]()
+        found = list[Cause]()
         for cause, replays in zip(causes, self._replays([cause.at(cause.size) for cause in causes]), strict=True):
-            change, errors = cause.at(cause.size), list[float]()
+            change, agreements = cause.at(cause.size), list[RecordingAgreement]()
             for record, request, replayed in replays:
                 recording = request.measured.recording
                 for name, sensor in change.sensors.items():
@@ -1079,11 +1078,12 @@ class CauseSearch:
                         recording = recording.with_channel(name, values, recording.unit(name))
                 in_step = replace(request.measured, recording=recording)
                 corrected = replace(request, measured=in_step, settings=record.agreement.request.settings)
-                agreement = agreement_of(corrected, replayed, change.delay)
-                errors += [channel.in_noise for channel in agreement.channels]
+                agreements.append(agreement_of(corrected, replayed, change.delay))
+            delay = 0.0 if change.has_delay else max(agreement.delay for agreement in agreements)
+            left = max(channel.in_noise for agreement in agreements for channel in agreement.channels)
             # Wrong samples are left out of the errors of the search alone.
-            left.append(max(errors) if change.start is None else cause.left)
-        return left
+            found.append(replace(cause, left=cause.left if cause.is_of_samples else left, delay=delay))
+        return found
 
 
 def _request(record: Record, change: ModelChange) -> Replay:

@@ -129,10 +129,6 @@ def test_the_verb_of_python_takes_what_the_command_takes(
         ([*SET, "other.csv"], "other.csv: cannot be read"),
         ([*SET, "step.csv", "--motion", "leg", "--volume", "60 cm^3"], "a fixed volume has no moving vane"),
         ([*SET, "step.csv", "--initial", "angle=3"], "initial value"),
-        (
-            ["validate", "ppafo2011", "step.csv"],
-            "above the supply of ppafo2011, 50 psi_g",
-        ),
         ([*SET, "step.csv", "broken.csv"], "broken.csv: line 2"),
     ],
 )
