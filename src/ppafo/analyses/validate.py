@@ -223,21 +223,25 @@ def verdict(validation: Validation) -> str:
     causes, passes, recordings = validation.causes, validation.passes, validation.recordings
     pairs = [(channel, agreement) for agreement in recordings for channel in agreement.channels]
     worst = max((channel for channel, _ in pairs), key=lambda channel: channel.in_noise)
+    removed = max(agreement.delay for agreement in recordings)
     if causes.is_noise:
         # The search fits the state at the start too, where a joint that moves already has no rest to read it from.
         fitted = " once the state at the start is fitted" if worst.in_noise > _OF_START else ""
         texts = [f"nothing but noise is left{fitted}"]
     else:
-        share = f"{percentage(worst.fraction, 2)} of full range"
-        texts = [f"{worst.channel} is off by {_times(worst.in_noise)} times its noise ({share})"]
-        if not passes and causes.found is None and any(row.request.settings.motion == "free" for row in recordings):
-            texts.append("the vane was taken to be free")
+        texts = [
+            f"{worst.channel} is off by {_times(worst.in_noise)} times its noise "
+            f"({percentage(worst.fraction, 2)} of full range)"
+        ]
         if causes.found is not None:
+            removed = causes.found.delay
             # An error beyond a limit is more than usual, of whatever kind it is.
             said = f"{causes.found.in_words}{', as on any bench' if causes.found.is_usual and passes else ''}"
             same = ", ".join(cause.name for cause in causes.found.same)
-            texts.append(f"{said} (indistinguishable with these recordings: {same})" if same else said)
+            texts.insert(0, f"{said} (indistinguishable with these recordings: {same})" if same else said)
         elif causes.tried or causes.kinds:
+            if not passes and any(row.request.settings.motion == "free" for row in recordings):
+                texts.append("the vane was taken to be free")
             second = ", for a second one is seen beside the nearest" if causes.has_second else ""
             texts.append(f"no single change explains the residual{second}")
             # Named if it at least halves the error, leaves noise, or is of wrong samples, found whatever else is wrong.
@@ -251,7 +255,7 @@ def verdict(validation: Validation) -> str:
                 texts.append(f"nearest: {', or '.join(left)}")
             texts += [f"tried: {causes.kinds}"] if causes.kinds else []
     # Said if it is longer than usual of sensors: a valve may be late as well.
-    if (removed := max(agreement.delay for agreement in recordings)) > PRESSURE_ERRORS.delay:
+    if removed > PRESSURE_ERRORS.delay:
         said = f"a delay of {1.0e3 * removed:.3g} ms was removed"
         if (delay := validation.device.valve.settings.get("delay")) is not None:
             said += f", of the sensors or of the valve (valve.delay = {1.0e3 * (delay + removed):.3g} ms)"
@@ -265,11 +269,10 @@ def verdict(validation: Validation) -> str:
             if not channel.passes
         )
         return f"{name} does not agree: {failed}; {explanation}"
-    agreed = f"{name} agrees with {count_of(len(recordings), 'recording')}: every RMS error is within its limit"
-    if not causes.is_noise:
-        wide = percentage(worst.limit, 3)
-        agreed += f" ({worst.channel}: {wide}, which is wider than the noise and may hide a wrong number)"
-    return f"{agreed}; {explanation}"
+    agreed = f"{name} agrees with {count_of(len(recordings), 'recording')}"
+    if causes.is_noise or (causes.found is not None and causes.found.is_usual):
+        return f"{agreed}: every RMS error is within its limit; {explanation}"
+    return f"{agreed} within {percentage(worst.limit, 3)} of full range, but {explanation}"
 
 
 def _times(size: float) -> str:

@@ -331,9 +331,9 @@ class LaneBlock:
         self._parameters[rows] = values[:, None]
 
     def set_earlier(self, commands: Floats) -> None:
-        """Set the commands of the steps (steps,) before the first step; the first of them has always stood."""
+        """Set the commands of the steps (steps, runs) before the first step; the first of them has always stood."""
         count = len(self._commands) - 1
-        self._commands[1:] = np.pad(commands, (count, 0), "edge")[-count:, None]
+        self._commands[1:] = np.pad(_pad_columns(commands), ((count, 0), (0, 0)), "edge")[-count:]
 
     def late_signals(self, step: int) -> Floats:
         """Angle [rad] and pressures [Pa] (3, runs) of delayed sensors at ``step``, the next step, except the first."""

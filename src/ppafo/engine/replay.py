@@ -3,6 +3,7 @@
 Between two changes of the inputs a run proceeds without interruption, so that constant inputs cost only a few calls.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -11,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.control.kind import ProfileKind
+from ppafo.engine.in_python import functions_of
 from ppafo.engine.lane_rows import lanes_of
 from ppafo.engine.lanes import Batch, BatchResult, begin_block, join_results
 from ppafo.engine.rows import group_of, leaf_paths, leaves, of_each, row_numbers
-from ppafo.engine.step.lane import LaneTiming
+from ppafo.model.effects.kind import PlantSnapshot
+from ppafo.model.ports import at_valve
 
 Floats = NDArray[np.float64]
 
@@ -59,7 +62,10 @@ class StepInputs:
     parameters: Mapping[str, Floats]
     """Values of each step (steps,) [SI] by the path of a parameter such as ``plant.supply_pressure``."""
     earlier: Floats | None = None
-    """Commands of the steps before the first (steps,) [-], the first of which has always stood; None without any."""
+    """Commands of the steps before the first (steps,) [-], the first of which has always stood; None without any.
+
+    A first one that is not a number stands for the command that holds the pressures at the start, 0 of most valves.
+    """
 
 
 def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
@@ -77,14 +83,15 @@ def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
     # Steps at which any input differs from the step before, the first step among them.
     starts = [0, *(np.flatnonzero((np.diff(table, axis=1) != 0.0).any(axis=0)) + 1).tolist()]
     ends = [*starts[1:], batch.clock.step_count]
-    results = []
+    results, before = [], None
     if inputs.earlier is not None:
-        batch = replace(batch, states=_with_valves_after(batch, inputs.earlier))
+        states, before = _started(batch, inputs.earlier)
+        batch = replace(batch, states=states)
     for runs_of_block in blocks:
         parameters, states = batch.parameters[:, runs_of_block], batch.states[:, runs_of_block]
         block = begin_block(replace(batch, parameters=parameters, states=states))
-        if inputs.earlier is not None:
-            block.set_earlier(inputs.earlier)
+        if before is not None:
+            block.set_earlier(before[:, runs_of_block])
         for start, end in zip(starts, ends, strict=True):
             if inputs.command is not None:
                 block.states[command_row] = inputs.command[start]
@@ -95,29 +102,56 @@ def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
     return join_results(results)
 
 
-def _with_valves_after(batch: Batch, earlier: Floats) -> Floats:
-    """Return the initial states (rows, runs) of a batch with valves as they are after earlier commands (steps,)."""
+def _started(batch: Batch, earlier: Floats) -> tuple[Floats, Floats]:
+    """Return initial states (rows, runs) with valves and effects as after earlier commands (steps,), and these.
+
+    The commands (steps, runs) have for a first one that is not known that which holds the pressures at the start.
+    """
     program, delay = batch.program, batch.clock.command_delay
+    valve, stated = program.valve, program.stated
     # The last ones have not arrived yet.
     arrived = earlier[: max(1, earlier.size - delay)]
     changes = np.flatnonzero(np.diff(arrived)) + 1
-    commands = arrived[[0, *changes]].tolist()
+    later = arrived[changes].tolist()
+    rows_at_start = dict[str, Any]()
+    # Laws of effects act on commands and in the valve, as in a step.
+    linked = functions_of(program, rows_at_start)
+    asked_by, settle, next_event, advance = map(linked.of, (at_valve, valve.settle, valve.next_event, valve.advance))
 
-    def valve_at_start(valve: Any, timing: LaneTiming) -> Any:
-        begins = (changes - earlier.size + delay + timing.command_lag) * timing.step
-        state, time = program.valve.state(), _LONG_AGO
-        for command, end in zip(commands, [*begins.tolist(), 0.0], strict=True):
+    def at_start(rows: Mapping[str, Any]) -> tuple[Any, ...]:
+        timing, state, own = rows["timing"], rows["state"], rows["valve"]
+        pressures = program.actuator.pressures(rows["plant"], state.angle, state.mass_1, state.mass_2)
+        first = float(arrived[0])
+        if math.isnan(first):
+            first = 0.0 if valve.command_for is None else valve.command_for(own, 0.0, *pressures)
+        now = PlantSnapshot(state.angle, state.angular_velocity, *pressures, command=first)
+        rows_at_start.update(rows)
+        for name, kind in stated.items():
+            rows_at_start[f"{name}_state"] = kind.row() if kind.start is None else kind.start(rows[name], now)
+        begins = ((changes - earlier.size + delay + timing.command_lag) * timing.step).tolist()
+        valve_state, time = valve.state(), _LONG_AGO
+        for command, end in zip([first, *later], [*begins, 0.0], strict=True):
+            for name, kind in stated.items():
+                if kind.settle is not None:
+                    before = rows_at_start[f"{name}_state"]
+                    rows_at_start[f"{name}_state"] = kind.settle(rows[name], before, command)
+            asked = asked_by(command)
+            if time == _LONG_AGO and valve.holding is not None:
+                valve_state, time = valve.holding(own, asked, *pressures), end
             while time < end:
-                settled = program.valve.settle(valve, state, command, time)
-                event = program.valve.next_event(valve, settled, command, time)
+                settled = settle(own, valve_state, asked, time)
+                event = next_event(own, settled, asked, time)
                 until = min(end, max(event, time + _LEAST_PART))
-                _, state = program.valve.advance(valve, state, command, time, until - time)
+                _, valve_state = advance(own, valve_state, asked, time, until - time)
                 time = until
-        return state
+        return first, valve_state, *(rows_at_start[f"{name}_state"] for name in stated)
 
-    groups, states = program.parameter_rows(), batch.states.copy()
-    given = (group_of(name, groups, batch.parameters) for name in ("valve", "timing"))
-    rows, numbers = row_numbers(program.state_rows()), leaves(of_each(valve_at_start, *given))
-    for path, values in zip(leaf_paths(program.valve.state, "valve_state"), numbers, strict=True):
-        states[rows[path]] = values
-    return states
+    tables = (program.parameter_rows(), batch.parameters), (program.state_rows(), batch.states)
+    groups = {name: group_of(name, kinds, table) for kinds, table in tables for name in kinds}
+    first, *begun = of_each(at_start, groups)
+    kinds = {"valve_state": program.valve.state, **program.effect_states}
+    numbers, states = row_numbers(program.state_rows()), batch.states.copy()
+    paths = [path for name, kind in kinds.items() for path in leaf_paths(kind, name)]
+    for path, values in zip(paths, leaves(begun), strict=True):
+        states[numbers[path]] = values
+    return states, np.where(np.isnan(earlier[:, None]), first, earlier[:, None])

@@ -41,12 +41,13 @@ _ROUNDING = 1.0e-9
 """Smallest difference of values, relative to their range [-], that is a converter step and not file rounding."""
 _SHARE_THAT_DIFFERS = 0.5
 """Largest fraction of distinct values [-] in a signal with a visible converter step."""
-_SHARE_OF_LAGS = 0.1
-"""Largest correlation time of noise, relative to the recording length [-]; slower residuals are model error."""
 _BY_CHANCE = 8.0
 """Significance of correlated noise: four standard errors of the quartile of differences, times root of count."""
-_QUARTER = 0.31864
-"""Lower quartile of the absolute value of a standard normal variable [-]."""
+_LONGEST_WINDOW, _SHORTEST_WINDOW = 4, 12
+"""Longest windows for the noise, as parts of a recording, and the shortest [samples]."""
+_LASTING, _GROWING, _MOST_MEMORY = 0.3, 1.25, 1.4
+"""Fraction of the spread in a window that noise has in one of half the length, usual growth from there, and largest
+growth by the memory of noise [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,30 +188,34 @@ def noise_of(values: Floats) -> float:
     """
     if values.size < MINIMUM_SAMPLES:
         return 0.0
-    differences = _third_differences(values, 1)
+    differences = np.abs(np.diff(values, n=3))
     most = _KEPT * _SPREAD_OF_MEDIAN * float(np.median(differences))
     inner = differences[differences <= most]
     return float(np.sqrt(np.mean(inner * inner)) / _SHARE_OF_KEPT / _GAIN_OF_DIFFERENCES)
 
 
-def _third_differences(values: Floats, lag: int) -> Floats:
-    """Return the absolute third differences of samples ``lag`` apart, which vanish for a parabola."""
-    first, second, third, fourth = (values[place * lag : values.size - (3 - place) * lag] for place in range(4))
-    return np.asarray(np.abs(fourth - 3.0 * third + 3.0 * second - first))
+def lasting_noise_of(values: Floats, most: float = math.inf) -> float:
+    """Return the standard deviation of possibly correlated noise in a signal [unit of the signal].
 
-
-def correlated_noise_of(values: Floats) -> float:
-    """Return the standard deviation of possibly correlated noise in residuals [unit of the residuals].
-
-    Third differences with larger lags include noise that neighbouring samples share. The quarter of the recording with
-    the smallest differences is used, because model errors occur during motion. The result never exceeds the spread
-    about the median, which is insensitive to a constant error.
+    It is the spread about a cubic over windows, of which the quarter with the smallest is used: where the signal is
+    smooth or at rest. Of noise the spread lasts as a window is halved, of a smooth signal hardly any is left; the
+    longest windows in which it lasts show noise that neighbouring samples share; more than ``most`` is the signal's.
     """
-    if values.size < MINIMUM_SAMPLES:
-        return 0.0
-    lags = [2**power for power in range(values.size.bit_length()) if 3 * 2**power <= _SHARE_OF_LAGS * values.size]
-    sizes = [float(np.quantile(_third_differences(values, lag), 0.25)) for lag in lags]
-    apart = max(sizes, default=0.0) / (_QUARTER * _GAIN_OF_DIFFERENCES)
-    spread = _SPREAD_OF_MEDIAN * float(np.median(np.abs(values - np.median(values))))
-    correlated, white = min(apart, spread), noise_of(values)
-    return correlated if correlated > (1.0 + _BY_CHANCE / math.sqrt(values.size)) * white else white
+    white, length = noise_of(values), values.size // _LONGEST_WINDOW
+    while length >= 2 * _SHORTEST_WINDOW:
+        spread, half, quarter = (_spread_about_cubics(values, length // part) for part in (1, 2, 4))
+        if half > _LASTING * spread and spread < most:
+            # What grows alike twice has a memory longer than the window; of a curve the last growth is larger.
+            memory = min(spread / half, half / max(quarter, white), _MOST_MEMORY)
+            lasting = min(spread, _GROWING * half) * max(memory, 1.0) ** 2
+            return lasting if lasting > (1.0 + _BY_CHANCE / math.sqrt(values.size)) * white else white
+        length //= 2
+    return white
+
+
+def _spread_about_cubics(values: Floats, length: int) -> float:
+    """Return the lower quartile of the standard deviations about a cubic over half-overlapping windows of a length."""
+    windows = np.lib.stride_tricks.sliding_window_view(values, length)[:: max(length // 2, 1)]
+    basis, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, length), 4))
+    about = windows - (windows @ basis) @ basis.T
+    return float(np.quantile(np.sqrt(np.square(about).sum(axis=1) / max(length - 4, 1)), 0.25))

@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 from ppafo.errors import DataError, PpafoError
 from ppafo.parameters.device import Device
 from ppafo.signals import Recording
-from ppafo.signals.faults import correlated_noise_of, noise_of, resolution_of
+from ppafo.signals.faults import lasting_noise_of, resolution_of
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.channels import DORSIFLEXION_SUPPLY, SUPPLY, regular_interval
 from ppafo.simulation.recorded.replay import with_fixed_volume
@@ -36,6 +36,8 @@ ENGINE_ERROR = 3.0e-5
 """Integration error of the engine as a fraction of the full range [-] (tests/convergence)."""
 LEAST_NOISE = 1.0e-4
 """Lower bound of the estimated sample noise as a fraction of the full range [-]."""
+_OF_RANGE = 0.01
+"""Largest noise of a sensor as a fraction of the range of its signal [-]."""
 _UNMOVED = 1.0e-3
 """Accepted error of a constant signal, as a fraction of the full range [-]: the zero error of its sensor."""
 _WITHIN_NOISE = 1.5
@@ -151,7 +153,8 @@ def noise_in(values: Floats, full_range: float) -> float:
     """Return the noise of samples [their unit], including the rounding of a converter with resolution / sqrt(8)."""
     # At rest a coarse converter repeats one value, and third differences see no noise at all. It is then off by up to
     # half a step throughout, whose square is twice this one's, and not by what rounding leaves on average.
-    return max(math.hypot(noise_of(values), resolution_of(values) / math.sqrt(8.0)), LEAST_NOISE * full_range)
+    lasting = lasting_noise_of(values, _OF_RANGE * float(np.ptp(values)))
+    return max(math.hypot(lasting, resolution_of(values) / math.sqrt(8.0)), LEAST_NOISE * full_range)
 
 
 def replay_of(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> Replay:
@@ -242,7 +245,7 @@ def _channel(
     weights = weights / weights.sum()
     model, unaligned = (np.interp(times - late, replay.time, replay[name]) for late in (delay, 0.0))
     residuals = values - model
-    noise = max(noise_in(values, span), correlated_noise_of(residuals))
+    noise = noise_in(values, span)
     deviation = values - weights @ values
     variation = math.sqrt(max(float(weights @ deviation**2) - noise * noise, 0.0))
     worst = int(np.argmax(np.abs(residuals)))

@@ -30,7 +30,7 @@ from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.report.kind import Kind
-from ppafo.signals.faults import correlated_noise_of, isolated_samples
+from ppafo.signals.faults import isolated_samples
 from ppafo.signals.recording import Floats, Recording
 from ppafo.simulation.numbers import declared_numbers, number_at, other_form, with_numbers
 from ppafo.simulation.recorded.channels import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
@@ -284,7 +284,7 @@ def record_of(agreement: RecordingAgreement) -> Record:
             words.append(f"{channel.channel} {said}")
             has_few = has_few and is_isolated and float(is_wrong.mean()) < _FEW_OUTLIERS
             good[row] -= is_wrong
-            noise[row] = max(noise_in(values[~is_wrong], channel.full_range), correlated_noise_of(residuals[~is_wrong]))
+            noise[row] = noise_in(values[~is_wrong], channel.full_range)
     record = Record(
         agreement=agreement,
         channels=tuple(channel.channel for channel in compared),
@@ -417,7 +417,8 @@ class Cause:
     is a change too. ``unit``: unit of the changed parameter.
 
     ``size``: magnitude, for ratios its logarithm. ``slope``: derivative of all errors by it, divided by noise [-].
-    ``left``: largest RMS error of any channel divided by its noise [-] under the cause. ``same``: other causes that the
+    ``left``: largest RMS error of any channel divided by its noise [-] under the cause. ``delay``: common delay [s] of
+    the measurement beside a cause that was found, 0 if the cause is a delay itself. ``same``: other causes that the
     recordings cannot distinguish from this one; of the nearest cause, the two next ones.
     """
 
@@ -435,6 +436,7 @@ class Cause:
     gain: float = 0.0
     left: float = math.nan
     slope: Floats = field(default_factory=lambda: np.zeros(0))
+    delay: float = 0.0
     same: "tuple[Cause, ...]" = ()
 
     @property
@@ -1048,7 +1050,10 @@ class CauseSearch:
             alike,
             key=lambda cause: (cause.name not in alone, not cause.at(cause.size).numbers, -cause.gain),
         )
-        return replace(first, same=tuple(rest))
+        # Without the cause, a delay stands for a part of it.
+        (under,) = self.agreements_under([first])
+        delay = 0.0 if first.at(first.size).has_delay else max(agreement.delay for agreement in under)
+        return replace(first, same=tuple(rest), delay=delay)
 
     def unexplained(self, tried: Sequence[Cause], kinds: str) -> Diagnosis:
         """Return the diagnosis without a cause, with the best of the causes ``tried``, of the ``kinds`` in words."""
@@ -1066,11 +1071,23 @@ class CauseSearch:
     def left_by(self, causes: Sequence[Cause]) -> list[float]:
         """Return the largest RMS error of any channel that each cause leaves, divided by its noise [-].
 
-        It is what a validation finds once the cause is mended, with its rule for the common delay: none at its limit.
+        It is what a validation finds once the cause is mended.
         """
-        left = list[float]()
+        agreements = self.agreements_under(causes)
+        # Wrong samples are left out of the errors of the search alone.
+        return [
+            cause.left
+            if cause.is_of_samples
+            else max(channel.in_noise for agreement in under for channel in agreement.channels)
+            for cause, under in zip(causes, agreements, strict=True)
+        ]
+
+    def agreements_under(self, causes: Sequence[Cause]) -> list[list[RecordingAgreement]]:
+        """Return what a validation finds in each recording once a cause is mended, with its rule for the delay."""
+        found = []
         for cause, replays in zip(causes, self._replays([cause.at(cause.size) for cause in causes]), strict=True):
-            change, errors = cause.at(cause.size), list[float]()
+            change = cause.at(cause.size)
+            found.append(list[RecordingAgreement]())
             for record, request, replayed in replays:
                 recording = request.measured.recording
                 for name, sensor in change.sensors.items():
@@ -1079,11 +1096,8 @@ class CauseSearch:
                         recording = recording.with_channel(name, values, recording.unit(name))
                 in_step = replace(request.measured, recording=recording)
                 corrected = replace(request, measured=in_step, settings=record.agreement.request.settings)
-                agreement = agreement_of(corrected, replayed, change.delay)
-                errors += [channel.in_noise for channel in agreement.channels]
-            # Wrong samples are left out of the errors of the search alone.
-            left.append(max(errors) if change.start is None else cause.left)
-        return left
+                found[-1].append(agreement_of(corrected, replayed, change.delay))
+        return found
 
 
 def _request(record: Record, change: ModelChange) -> Replay:

@@ -26,7 +26,7 @@ from ppafo.storage.foreign import read_foreign
 from ppafo.storage.reading import read_recording
 from ppafo.storage.result_folder import NETCDF_FILE
 from ppafo.units.shown import in_units, shown_text
-from ppafo.validation.settings import COMPARED, PRESSURE_1, PRESSURE_2, full_range
+from ppafo.validation.settings import COMPARED, full_range
 from ppafo.wording import count_of, nearest_name
 
 MINIMUM_SAMPLES = 10
@@ -34,10 +34,6 @@ MINIMUM_SAMPLES = 10
 
 _REMARKED_GAP = 3.0
 """Time gap from which a remark is made, in usual sample intervals [-]."""
-_ABOVE_SUPPLY = 0.05
-"""Largest disagreement of two pressure sensors, as a fraction of the gauge supply pressure [-]."""
-_ROUNDING = 1.0e-9
-"""Relative pressure difference [-] due to rounding, by which a settled chamber may exceed its supply."""
 _MAXIMUM_RANGES = 20.0
 """Largest plausible reading in full ranges [-]; a larger reading means a damaged line or a wrong unit."""
 _MINIMUM_CHANGE = 0.01
@@ -117,18 +113,9 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
                 f"s (sample {worst + 1}), more than {_MAXIMUM_RANGES:g} times what {device.name} can reach"
             )
     check_absolute(recording, supply.atmospheric_pressure, file)
-    owner = f"the recorded '{SUPPLY}'" if SUPPLY in recording else f"the supply of {device.name}"
-    recorded = {name: float(recording[name].max()) for name in supplies if name in recording}
-    first = recorded.get(SUPPLY, supply.pressure)
-    highest = max(first, recorded.get(DORSIFLEXION_SUPPLY, recorded.get(SUPPLY, supply.dorsiflexion_pressure)))
-    allowed = highest + _ABOVE_SUPPLY * (highest - supply.atmospheric_pressure)
-    for name in (name for name in (PRESSURE_1, PRESSURE_2) if name in recording):
-        level = max(float(recording[name][0]), float(np.median(recording[name])))
-        if level > allowed * (1.0 + _ROUNDING):
-            shown = [shown_text(pressure, "Pa_a", ".4g", supply.atmospheric_pressure) for pressure in (level, highest)]
-            raise DataError(f"{file}: '{name}' stays at {shown[0]}, above {owner}, {shown[1]}")
     gauge = supply_gauge(recording, device)
     if gauge <= 0.0:
+        owner = f"the recorded '{SUPPLY}'" if SUPPLY in recording else f"the supply of {device.name}"
         raise DataError(
             f"{file}: {owner} must be above atmospheric pressure, because errors of pressure are fractions of its "
             "gauge pressure"

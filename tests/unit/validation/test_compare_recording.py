@@ -289,3 +289,18 @@ def test_a_recording_that_begins_in_motion_has_velocity_and_valve_of_its_start(
     begin = float(recording.time[int(np.argmax(np.gradient(recording["angle"], recording.time) > 2.0))])
     cut = only(recording.between(begin, 0.5), "command", "angle", "pressure_1", "pressure_2")
     assert max(shares(agree(cut, scenario.device)).values()) < 5e-3
+
+
+def test_the_limit_of_an_error_is_that_of_the_recording_whatever_model_it_is_compared_with(agree: Agree) -> None:
+    scenario = load_scenario("torque-task-moving-ankle", ["run.duration=2 s"])
+    recording, random = simulate(scenario).recording, np.random.default_rng(3)
+    noisy = {
+        name: recording[name] + 60.0 * random.standard_normal(len(recording)) for name in ("pressure_1", "pressure_2")
+    }
+    read = with_channels(recording, **noisy)
+    limits = []
+    for words in ([], ["valve.area=20 mm^2", "actuator.dead_volume_1=80 cm^3"]):
+        channels = agree(read, load_device("ppafo2011", overrides=words), motion="measured").channels
+        limits.append([channel.limit for channel in channels])
+        assert all(channel.noise < 90.0 for channel in channels if channel.channel in noisy)
+    assert limits[0] == limits[1]

@@ -129,12 +129,13 @@ class ValveMapProblem(flow.FlowLaw):
         # Corners are refuted where an opening with rounded ones, tried in its place, explains the readings better.
         if not self.nodes and (fitted.conflict is None or fitted.conflict.number == SHAPE):
             free = [number for number in numbers if math.isinf(number.deviation) or number.name == ZERO]
-            rounded, _ = bench.solve(shown, measured, groups, (*free, bench.sought(_ROUND, *_ROUNDS)), self.confidence)
+            free.append(bench.sought(_ROUND, *_ROUNDS))
+            rounded, _ = bench.solve(shown, measured, groups, free, self.confidence)
             gain = rounded.log_likelihood - fitted.log_likelihood
             if gain > _BETTER:
                 reason = (
-                    f"an opening whose corners are rounded over {rounded.by_name[_ROUND]:.2g} of the command, through "
-                    "which gas flows from the first command on, explains them better (nodes make a table of it)"
+                    f"an opening whose corners are rounded over {rounded.by_name[_ROUND]:.2g} of the command explains "
+                    "them better (nodes make a table of it)"
                 )
                 fitted = replace(fitted, conflict=other_shape("mass_flow", math.sqrt(2.0 * gain)))
         if not (is_two_way or self.nodes):

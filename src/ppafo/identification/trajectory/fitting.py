@@ -40,7 +40,7 @@ from ppafo.identification.trajectory.experiment import (
 )
 from ppafo.model.columns import at, over_runs
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.signals.faults import correlated_noise_of, is_at_limit, noise_of, plateaus, resolution_of, rounding_of
+from ppafo.signals.faults import is_at_limit, lasting_noise_of, noise_of, plateaus, resolution_of, rounding_of
 from ppafo.signals.recording import CHANNELS, Channel, Floats, Recording
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, SUPPLY, sample_period
@@ -441,7 +441,7 @@ def _result(
             drift, most = (shown_text(size, number.unit, digits=2) for size in (wander, limit))
             conflicts.append(f"the residual of {name} drifts by {drift}, but the zero of its sensor by at most {most}")
     for (measured, name, residuals), block in zip(_residuals(measurements, models), blocks, strict=True):
-        sensor, lasting = fitted.sensors[name], correlated_noise_of(residuals)
+        sensor, lasting = fitted.sensors[name], lasting_noise_of(residuals)
         rms, span = float(np.sqrt(np.mean(np.square(residuals)))), float(np.ptp(measured[name]))
         sizes = sensor.deviation, sensor.order, rms, float(np.max(np.abs(residuals))), span
         channels.append(ChannelFit(measured.label, name, measured.unit(name), *sizes))

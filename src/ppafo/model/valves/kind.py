@@ -42,7 +42,9 @@ class ValveModel:
 
     Such a valve has ``connect_ahead(plant, shown)``, the ports at the second stage of a step, and ``command_for(
     parameters, opening, pressure_1, pressure_2)``, the command [-] at which it changes the measured pressures [Pa] as
-    the opening [-] wanted by a law would; None for others.
+    the opening [-] wanted by a law would; None for others. ``holding(parameters, command, pressure_1, pressure_2)`` is
+    the state in which it holds these pressures [Pa] under a command [-], for a recording that begins in operation; None
+    for a valve whose state follows from a command that has stood long enough.
     """
 
     parameters: type
@@ -60,6 +62,7 @@ class ValveModel:
     settle: Callable[[Any, Any, float, float], Any]
     connect_ahead: Callable[[PlantParameters, Any], tuple[Any, Any]] | None = None
     command_for: Callable[[Any, float, float, float], float] | None = None
+    holding: Callable[[Any, float, float, float], Any] | None = None
 
     @property
     def regulates(self) -> bool:

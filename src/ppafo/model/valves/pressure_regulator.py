@@ -198,6 +198,13 @@ def command_for(valve: RegulatorParameters, opening: float, pressure_1: float, p
     return opening if opening > VENTS_ABOVE else max(-1.0, min(1.0, present + opening))
 
 
+def holding(valve: RegulatorParameters, command: float, pressure_1: float, pressure_2: float) -> RegulatorState:
+    """State under a command [-] with the set pressures at those in the chambers [Pa absolute], within their range."""
+    set_1 = max(0.0, min(valve.range, pressure_1 - valve.lowest))
+    set_2 = max(0.0, min(valve.range, pressure_2 - valve.lowest))
+    return settle(valve, RegulatorState(set_1 / valve.range, set_2 / valve.range, set_1, set_2), command, 0.0)
+
+
 def prepare(settings: RegulatorSettings) -> RegulatorParameters:
     """Parameters of the regulators from ``settings`` [SI]."""
     width = max(settings.highest_pressure - settings.lowest_pressure, SMALLEST_RANGE)
@@ -239,6 +246,7 @@ MODEL = ValveModel(
     settle=settle,
     connect_ahead=connect_ahead,
     command_for=command_for,
+    holding=holding,
 )
 
 

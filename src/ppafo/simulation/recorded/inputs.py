@@ -19,10 +19,8 @@ from ppafo.simulation.recorded.channels import (
     SUPPLY,
     between_stops,
 )
-from ppafo.simulation.recorded.rest import motion_at
+from ppafo.simulation.recorded.rest import LONGEST_ONSET, commands_ahead
 
-_HISTORY = 0.25
-"""Time before the start for which a valve follows the recorded commands [s], longer than any dead time."""
 _SUPPLY_PATH, _DORSIFLEXION_PATH = "plant.supply_pressure", "plant.dorsiflexion_pressure"
 
 
@@ -59,14 +57,12 @@ def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
     command, earlier, recording = None, None, inputs.recording
     if COMMAND in inputs.names:
         command, begin = _values_at_steps(inputs, COMMAND, run), float(recording.time[0])
-        # A recording that begins in motion under a command begins after it, and one at rest begins with it: the vane
-        # cannot have been set in motion at once; a pressure may.
-        first = recording[COMMAND][:1]
-        has_stood = first.any() and motion_at(recording, begin) is not None
-        count = int(min(inputs.start - begin, _HISTORY) / run.step)
+        count = int(min(inputs.start - begin, LONGEST_ONSET) / run.step)
         before = _values_at_steps(inputs, COMMAND, run, -count)[:count]
-        # The first of them has always stood.
-        earlier = np.concatenate([first if has_stood else [0.0], before])
+        # Ahead of the history stands its own first command, ahead of a recording what holds its state.
+        is_cut = inputs.start - begin > LONGEST_ONSET
+        ahead = before[:1] if is_cut else commands_ahead(recording, device, run.step)
+        earlier = np.concatenate([ahead, before])
     # The parameters that follow a recording [SI], for every step.
     followed: dict[str, Floats] = {}
     # Later ones prevail: a regulator with a recording of its own does not follow the supply.

@@ -6,8 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import DataError
+from ppafo.model.catalog import VALVES
 from ppafo.parameters.device import Device
+from ppafo.parameters.plant import first_settings
 from ppafo.signals import Recording
 from ppafo.signals.faults import noise_of, resolution_of
 from ppafo.signals.recording import Floats
@@ -32,6 +35,19 @@ _DEVIATION_OF_MEDIAN = 1.4826
 """Standard deviation of normal noise divided by its median absolute value: 1 / (0.75 quantile of a standard normal)."""
 _LEAST_RANK = 1.0e-6
 """Smallest singular value divided by the largest for which powers of time count as independent."""
+
+LONGEST_ONSET = 0.25
+"""Time after which a valve has followed a command, longer than any dead time [s]."""
+_LEAST_OF_RANGE, _CLEAR = 1.0e-4, 20.0
+"""Least noise as a fraction of the range of a channel, and change that shows a motion without doubt, in noises [-]."""
+_AT_END = 0.3 * PASCALS_PER_PSI
+"""Usual zero of a pressure sensor, within which a chamber is at the atmosphere or at its supply [Pa]."""
+_HALF, _STANDING = 0.4, 2.0
+"""Fraction of a motion done in half of its time [-], from which it has not begun in this time: steady, it is 0.5; and
+least time at rest that a valve without a motion holds, over which a command is a parabola too [times until it follows].
+"""
+_FEWEST_ON_CURVE, _SMOOTH = 4, 0.01
+"""Fewest samples of a command that runs smoothly, and its distance from a parabola [ranges]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +82,43 @@ def motion_at(recording: Recording, start: float) -> tuple[float, float, float] 
         angle, velocity = float(coefficients[3]), float(coefficients[2])
         found = angle, velocity, _SURE * max(noise, scatter) * math.sqrt(float(covariance[2, 2]))
     return found if found is not None and abs(found[1]) > _LEAST_VELOCITY + _SEEN * found[2] else None
+
+
+def commands_ahead(recording: Recording, device: Device, step: float) -> Floats:
+    """Return the commands (steps,) before a recording: those that reached the valve, or one that is not a number.
+
+    A pressure that a command moves from its first sample on begins flat, for as long as the valve takes to follow, or
+    from the pressure of the atmosphere or of its supply; one that has moved before has its slope at once. Where nothing
+    moves until the command changes, for longer than the valve takes, the valve holds it. A command that runs smoothly
+    is continued by its parabola, any other one has stood.
+    """
+    time, command, supply = recording.time - recording.time[0], recording[COMMAND], device.supply
+    kind, settings = VALVES[device.valve.kind], first_settings(device.valve)
+    onset = (kind.lag or kind.choose(settings).command_delay)(settings)
+    first, moves = time.size, False
+    for name, fed in (("pressure_1", supply.pressure), ("pressure_2", supply.dorsiflexion_pressure)):
+        values = recording[name] if name in recording else np.zeros(1)
+        least = max(read_error(recording, name), _LEAST_OF_RANGE * float(np.ptp(values)))
+        away = np.flatnonzero(np.abs(values - values[0]) > _CLEAR * least)
+        # The chamber that moves first tells.
+        if away.size and away[0] < first:
+            first = int(away[0])
+            last = max(2, first)
+            # Half of a steady motion is done after half of the time, and less of one that has begun since.
+            curve = np.polyfit(time[: last + 1] / time[last], values[: last + 1], 2)
+            half, whole = np.polyval(curve, [0.5, 1.0]) - curve[2]
+            end = supply.atmospheric_pressure if whole > 0.0 else fed
+            moves = time[last] < LONGEST_ONSET and half / whole > _HALF and abs(values[0] - end) > _AT_END
+    change = int(np.argmax(np.append(command[:-1] != command[0], True)))
+    is_held = change <= first and time[change] > max(_STANDING * onset, REST_WINDOW)
+    if not (moves or is_held or motion_at(recording, float(recording.time[0])) is not None):
+        return np.array([math.nan])
+    inside = time <= _STANDING * onset
+    if np.count_nonzero(inside) > _FEWEST_ON_CURVE:
+        curve = np.polyfit(time[inside], command[inside], 2)
+        if np.abs(np.polyval(curve, time[inside]) - command[inside]).max() < _SMOOTH * np.ptp(command):
+            return np.asarray(np.clip(np.polyval(curve, -step * np.arange(onset // step, 0.0, -1.0)), -1.0, 1.0))
+    return command[:1]
 
 
 def read_error(recording: Recording, name: str) -> float:
