@@ -110,7 +110,7 @@ _GAINS = (
 _SAME = 0.02
 """Relative difference up to which two settings count as the same [-]."""
 _COMMANDS = (-1.0, 64.0, 8.0, 1.0 / 16.0)
-"""Factors on the command of a Python object, whose gains nobody knows; the first one finds a wrong sign [-]."""
+"""Factors on the command of a Python object, whose gains are unknown; the first one detects a wrong sign [-]."""
 _FLAWS_OF_OBJECT, _LONGEST_OF_OBJECT = 3, 4.0
 """Number of flaws that are made ideal with a Python object, and its longest run divided by the present one [-]."""
 

@@ -71,7 +71,7 @@ def computed_by(
     def submit(number: int) -> None:
         if faults:
             return
-        # The mark tells submissions apart: Dask takes equal calls for one, which may be the one that failed.
+        # A mark for each submission: Dask merges equal calls, and would return the one that failed.
         mark = token_hex()
         # An executor of the user may raise anything.
         with noted_in(faults), refused_as(StudyError, "executor: takes no more work, give a new one", Exception):
@@ -134,7 +134,7 @@ def _end_with_caller() -> None:
         caller = os.getppid()
 
         def end() -> None:
-            # Forked workers keep each other's pipes to the caller open: its number tells too that it has ended.
+            # Forked workers keep each other's pipes to the caller open, so the number of the parent is compared too.
             while parent.is_alive() and os.getppid() == caller:
                 parent.join(_BETWEEN_LOOKS)
             os._exit(1)

@@ -153,7 +153,7 @@ def noise_in(values: Floats, full_range: float) -> float:
     """Return the noise of samples [their unit], including the rounding of a converter with resolution / sqrt(8)."""
     # At rest a coarse converter repeats one value, and third differences see no noise at all. It is then off by up to
     # half a step throughout, whose square is twice this one's, and not by what rounding leaves on average.
-    lasting = lasting_noise_of(values, _OF_RANGE * float(np.ptp(values)))
+    lasting = lasting_noise_of(values, _OF_RANGE * float(np.ptp(values)) if values.size else 0.0)
     return max(math.hypot(lasting, resolution_of(values) / math.sqrt(8.0)), LEAST_NOISE * full_range)
 
 
