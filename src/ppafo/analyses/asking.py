@@ -45,6 +45,7 @@ from ppafo.study.blocks import unvaried
 from ppafo.study.executing import executor_of
 from ppafo.study.runs import (
     FAILED,
+    FOLLOWS,
     Rows,
     RunCounter,
     Runs,

@@ -27,8 +27,6 @@ VariedRange = Annotated[str, Word("PATH=LOW..HIGH", option="--vary")]
 Condition = Annotated[str, Word("CONDITION", option="--such-that")]
 ACCURACY = 1.0e-6
 """Width of the last bracket, as a fraction of the range of values [-]."""
-FOLLOWS = "follows"
-"""Text of the condition that the run follows its reference, by the verdict of ``simulate``."""
 _SETTLED = "RMS error in the second half of the hold"
 """Number that decides in place of the error of one instant, for a loop that swings."""
 
@@ -147,7 +145,7 @@ def find(
         if row is None:
             row = int((np.nanargmin if limit.is_most else np.nanargmax)(rows["judged"]))
         # A loop that fails even at the nearest value is why no value meets the condition.
-        shown = [row] if (limit.text == FOLLOWS if index is not None else rows["is_missed"][row]) else []
+        shown = [row] if (limit.text == ask.FOLLOWS if index is not None else rows["is_missed"][row]) else []
         if outer is not None:
             try:
                 ask.with_overrides(base, [f"{path.path}={float(values[outer])!r} {SI}"])
@@ -213,16 +211,17 @@ def _limit(text: str, base: Scenario, path: str) -> ask.MetricLimit:
     Gauge pressures refer to the ambient pressure of the scenario, unless ``path``, the varied number, is this pressure.
     """
     quoted, parts = f"'{one_line(text)}'", re.fullmatch(r"\s*([\w.:]+)\s*(<=|>=)\s*(.+?)\s*", text)
-    if text.strip() == FOLLOWS:
+    if text.strip() == ask.FOLLOWS:
         # Every value that is found follows its reference; of two that do not, the error says which is nearer.
         tracked = (f"rms_{base.controlled}_error", "rms_error", "torque_error", "peak_torque")
         errors = [name for name in tracked if name in ask.METRICS and not ask.lacking(base, ask.METRICS[name])]
         if base.controller.is_open_loop or not errors:
             raise StudyError(f"{quoted} needs a reference, which scenario '{base.name}' lacks")
-        return ask.MetricLimit(errors[0], math.inf, True, FOLLOWS)
+        return ask.MetricLimit(errors[0], math.inf, True, ask.FOLLOWS)
     if parts is None:
         raise StudyError(
-            f"{quoted} must be METRIC <= LIMIT or METRIC >= LIMIT, for example 'final_error <= 0.3 N m', or '{FOLLOWS}'"
+            f"{quoted} must be METRIC <= LIMIT or METRIC >= LIMIT, for example 'final_error <= 0.3 N m', "
+            f"or '{ask.FOLLOWS}'"
         )
     metric, sign, level = parts.groups()
     ask.check_metrics([metric], base)
@@ -280,8 +279,8 @@ def judged(runs: ask.Rows, limit: ask.MetricLimit, streams: int) -> ask.Rows:
     # Nobody would build on a loop whose command turns all the time.
     metric, settled = runs[limit.metric], runs[f"judged_{limit.metric}"]
     oscillates, on_purpose = runs["oscillates"] == 1.0, runs[ask.ON_PURPOSE]
-    follows = by_value(runs[FOLLOWS] == 1.0).all(axis=0)
-    is_missed = by_value((runs[FOLLOWS] == 0.0) & ~on_purpose).any(axis=0)
+    follows = by_value(runs[ask.FOLLOWS] == 1.0).all(axis=0)
+    is_missed = by_value((runs[ask.FOLLOWS] == 0.0) & ~on_purpose).any(axis=0)
     number = by_value(np.where(oscillates, np.nan, settled)).mean(axis=0)
     is_kept = np.asarray(limit.is_kept(number))
     return {
@@ -289,12 +288,12 @@ def judged(runs: ask.Rows, limit: ask.MetricLimit, streams: int) -> ask.Rows:
         "judged": number,
         "spread": by_value(metric).std(axis=0, ddof=min(1, streams - 1)),
         "excess": by_value(runs["excess"]).max(axis=0),
-        FOLLOWS: follows,
+        ask.FOLLOWS: follows,
         ask.ON_PURPOSE: by_value(on_purpose).any(axis=0),
         "is_missed": is_missed,
         "is_kept": is_kept,
         # A run without a verdict is none that follows, nor one that misses its reference.
-        "is_met": is_kept & (follows if limit.text == FOLLOWS else ~is_missed),
+        "is_met": is_kept & (follows if limit.text == ask.FOLLOWS else ~is_missed),
         "unsettled": by_value(settled > metric).sum(axis=0),
         "oscillating": by_value(oscillates).sum(axis=0),
     }
@@ -319,7 +318,7 @@ def _finding(found: Threshold, rows: ask.Rows, row: int, kind: ask.Kind, base: S
 
     ``row`` is that of the value found, or of the nearest one.
     """
-    values, of_limit, is_verdict = rows["value"], ask.of_metric(found.metric), found.condition == FOLLOWS
+    values, of_limit, is_verdict = rows["value"], ask.of_metric(found.metric), found.condition == ask.FOLLOWS
     # Values that meet the condition although the run does not follow its reference.
     missed = 0 if is_verdict else int(np.count_nonzero(rows["is_missed"] & rows["is_kept"]))
     meets = "lets the run follow its reference" if is_verdict else f"meets {found.condition}"
@@ -394,7 +393,7 @@ def _finding(found: Threshold, rows: ask.Rows, row: int, kind: ask.Kind, base: S
 def _panel(found: Threshold, rows: ask.Rows, kind: ask.Kind, of_limit: ask.Kind, met: str) -> ask.Panel:
     """Return a panel of the metric over the value, with the limit, the values that meet it, and the result."""
     values, metric, number, limit = rows["value"], rows["metric"], rows["judged"], found.limit
-    if found.condition == FOLLOWS:
+    if found.condition == ask.FOLLOWS:
         # The excess decides whether a run follows; it has no larger number beside it.
         metric = number = rows["excess"]
         of_limit, limit = ask.Kind("Largest tracking number over its limit"), 1.0

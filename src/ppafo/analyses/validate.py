@@ -222,7 +222,8 @@ def verdict(validation: Validation) -> str:
 
     causes, passes, recordings = validation.causes, validation.passes, validation.recordings
     pairs = [(channel, agreement) for agreement in recordings for channel in agreement.channels]
-    worst = max((channel for channel, _ in pairs), key=lambda channel: channel.in_noise)
+    # The difference of two pressures is no channel of its own.
+    worst, _ = max(pairs, key=lambda pair: (pair[0].channel in pair[1].measured, pair[0].in_noise))
     removed = max(agreement.delay for agreement in recordings)
     if causes.is_noise:
         # The search fits the state at the start too, where a joint that moves already has no rest to read it from.

@@ -10,19 +10,22 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal, NamedTuple
 
+import numpy as np
+
 from ppafo.control.catalog import PROFILES
 from ppafo.control.kind import PythonController
 from ppafo.errors import PpafoError
 from ppafo.loading import reloaded
-from ppafo.model.controlled import ANGLE
+from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.model.plant import gravity_torque
 from ppafo.model.valves.kind import VENT
 from ppafo.parameters.device import SonicOrifice
-from ppafo.parameters.graph import PRESSURE_PATH, SECOND_PRESSURE_PATH
+from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.parameters.overrides import read_overrides
 from ppafo.parameters.plant import plant_parameters
 from ppafo.parameters.reach import HIGHEST_PRESSURE, supply_for
+from ppafo.simulation.clock import RATE_PATH
 from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.default_gains import SLOPE_GAINS, default_links
 from ppafo.simulation.numbers import declared_numbers, number_at, present_numbers
@@ -35,12 +38,11 @@ from ppafo.simulation.tracking.evidence import (
     LARGER_VALVE,
     LOAD,
     QUICKER_ABOVE,
-    RATE,
     SMALLER_REFERENCE,
     SMALLER_VALVE,
     ideal_words,
 )
-from ppafo.simulation.tracking.rule import only_switches
+from ppafo.simulation.tracking.rule import available_torque, only_switches
 
 Group = Literal["law", "start", "device", "sensors", "load", "task"]
 """Part of a scenario that a change concerns."""
@@ -89,6 +91,8 @@ _VOLUMES = (0.25, 4.0)
 """Dead volumes divided by the present ones [-]."""
 _SPEEDS, _SIZES = (0.5, 0.25, 0.1, 0.05), (0.8, 0.5, 0.25, 0.1)
 """Speed and size of the reference divided by the present ones [-]; anything follows a reference of almost nothing."""
+_WITHIN_REACH = 0.9
+"""Torque that replaces a reference far beyond reach, divided by what the actuator gives [-]."""
 _LONGER = 2.0
 """Duration of a longer run divided by the present one [-]."""
 _GAINS = (
@@ -236,8 +240,8 @@ def _ideal(path: str, number: float, item: Quantity) -> float:
 def _better_device(scenario: Scenario, present: Mapping[str, float]) -> Iterator[Change]:
     """Yield changes of the size of a device: rate, valve, supplies, dead volumes."""
     for by in _RATES:
-        if (rate := by * present[RATE]) <= _TOP_RATE:
-            yield Change(FASTER_CONTROLLER, "device", {RATE: rate}, scenario)
+        if (rate := by * present[RATE_PATH]) <= _TOP_RATE:
+            yield Change(FASTER_CONTROLLER, "device", {RATE_PATH: rate}, scenario)
     orifice = scenario.device.valve.orifice
     is_sonic = isinstance(orifice, SonicOrifice)
     size, kept = ("sonic_conductance", "critical_ratio") if is_sonic else ("area", "discharge_coefficient")
@@ -251,7 +255,10 @@ def _better_device(scenario: Scenario, present: Mapping[str, float]) -> Iterator
     for words, factors in ((SMALLER_VALVE, smaller), (LARGER_VALVE, larger)):
         for by in factors:
             yield Change(words, "device", {**form, f"valve.{size}": by * form[f"valve.{size}"]}, scenario)
-    supplies, room = [path for path in (PRESSURE_PATH, SECOND_PRESSURE_PATH) if path in present], present[_ROOM]
+    supplies, room = (
+        [path for path in (PRESSURE_PATH, SECOND_PRESSURE_PATH) if path in present],
+        present[ATMOSPHERE_PATH],
+    )
     for paths in (supplies[:1], supplies[1:], supplies):
         for by in _SUPPLIES if paths else ():
             pressures = {path: room + by * (present[path] - room) for path in paths}
@@ -266,13 +273,12 @@ def _better_device(scenario: Scenario, present: Mapping[str, float]) -> Iterator
         yield Change(words, "device", {path: by * present[path] for path in volumes}, scenario)
 
 
-_ROOM = "supply.atmospheric_pressure"
 _STARTS = ("initial.pressure_1", "initial.pressure_2")
 
 
 def _starts(scenario: Scenario, present: Mapping[str, float]) -> Iterator[Change]:
     """Yield changes of the initial pressures: those that carry the load of a free joint, and those of the room."""
-    room, motion, device = present[_ROOM], scenario.motion, scenario.device
+    room, motion, device = present[ATMOSPHERE_PATH], scenario.motion, scenario.device
     if _STARTS[0] not in present:
         return
     starts = [(room, room)]
@@ -323,8 +329,14 @@ def _easier_tasks(scenario: Scenario, present: Mapping[str, float]) -> Iterator[
     knots = [path for path in present if path.startswith("reference.value_")]
     used = [path for path in knots if present.get(path.replace("value", "time"), 0.0) < _UNUSED]
     start = next((present[path] for path in ("reference.start_level", "reference.value_01") if path in present), 0.0)
-    for by in _SIZES:
-        smaller = {path: start + by * (present[path] - start) for path in used or ("reference.level",)}
+    paths = used or ("reference.level",)
+    sizes = list(_SIZES)
+    if scenario.controlled == TORQUE:
+        farthest = max(abs(present[path]) for path in paths)
+        reach = _WITHIN_REACH * float(np.max(np.abs(available_torque(scenario))))
+        sizes += [reach / farthest] if farthest * _SIZES[-1] > reach else []
+    for by in sizes:
+        smaller = {path: start + by * (present[path] - start) for path in paths}
         if amplitude := present.get("reference.amplitude"):
             smaller = {"reference.amplitude": by * amplitude}
         yield Change(SMALLER_REFERENCE, "task", smaller, scenario)

@@ -30,6 +30,7 @@ from ppafo.exports.c_library.entries import with_reach
 from ppafo.exports.c_library.files import OUTPUTS, library_files
 from ppafo.exports.c_library.library import ExportParameter, Library
 from ppafo.exports.c_library.settings import limits_in_c
+from ppafo.exports.fmu.platforms import FLAGS
 from ppafo.loading import load_scenario
 from ppafo.model.controlled import CONTROLLED
 from ppafo.parameters.graph import ATMOSPHERE_PATH
@@ -63,9 +64,8 @@ _PANELS = (
 _HEADLINES = ("gas_supplied", "positive_push_off_work")
 """Metrics that are said after each change, beside the first one."""
 _WORDS = {"_g": " gauge", "_a": " abs", "_d": "", "^2": "²", "^3": "³"}
-_STRICT = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")
 _ALONE = ("-ffreestanding", "-nostdlib", "-fvisibility=hidden", "-I.", "-Wl,--no-entry", "-Wl,--strip-all")
-_FLAGS = (*_STRICT, *_ALONE, "-Wl,-z,stack-size=262144")
+_FLAGS = (*FLAGS, *_ALONE, "-Wl,-z,stack-size=262144")
 _ZIG = ("-m", "ziglang", "cc", "--target=wasm32-freestanding", "-mcpu=generic+bulk_memory", "-fno-sanitize=undefined")
 _CLANG = ("clang", "--target=wasm32", "-mbulk-memory")
 _REMEDY = "a page needs a compiler for WebAssembly: pip install 'ppafo[workbench]', or clang with lld"

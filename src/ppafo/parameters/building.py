@@ -59,7 +59,6 @@ _NO_LEAK = Orifice(area=0.0, discharge_coefficient=1.0)
 SUPPLIES = PRESSURE_PATH, SECOND_PRESSURE_PATH
 RELATIONS = {"below": operator.lt, "above": operator.gt, "at most": operator.le, "at least": operator.ge}
 """Relation of a number to another one, elementwise over runs, by its words."""
-_FLAT_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 
 
 def build_device(parameter_set: ParameterSet, valve: str | None = None, links: Graph | None = None) -> Device:
@@ -285,7 +284,7 @@ def orifice_form(parameter_set: ParameterSet, section: str) -> tuple[Quantity, .
 
 def needed_quantities(parameter_set: ParameterSet, valve: str) -> dict[str, tuple[Quantity, ...]]:
     """Return the quantities of a device with this valve by section, without those of a chamber 2 that it lacks."""
-    sections = {name: declaration.members(name, parameter_set.actuator_kind) for name in _FLAT_SECTIONS}
+    sections = {name: declaration.members(name, parameter_set.actuator_kind) for name in declaration.FLAT_SECTIONS}
     if parameter_set.has_one_chamber:
         absent = declaration.OF_SECOND_CHAMBER
         sections = {

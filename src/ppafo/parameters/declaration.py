@@ -72,6 +72,9 @@ SECTIONS: dict[str, tuple[Quantity, ...]] = {
     "reported": REPORTED,
 }
 
+FLAT_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
+"""Sections of a set with one number for each name."""
+
 OF_SECOND_CHAMBER = frozenset(
     {
         "actuator.dead_volume_2",

@@ -14,14 +14,15 @@ import numpy as np
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.model.columns import over_runs
 from ppafo.model.declaration import PlainFunction
-from ppafo.units import to_si
+from ppafo.units import LEVEL, to_si
 
 ATMOSPHERE_PATH = "supply.atmospheric_pressure"
 PRESSURE_PATH, SECOND_PRESSURE_PATH = "supply.pressure", "supply.dorsiflexion_pressure"
+GAS_PATHS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
 TORQUE_CONSTANT_PATH, DISPLACEMENT_PATH = "actuator.torque_constant", "actuator.displacement_per_radian"
 SAME_PRESSURE = 1.0e-6
 """Relative difference [-] below which two pressures in different units count as equal."""
-_LEVEL, _GAUGE = "Pa_a", "_g"
+_GAUGE = "_g"
 _COUNTS_FROM_STANDARD = ("controller.", "sensors.")
 
 
@@ -92,7 +93,7 @@ def gauge_link(path: str, value: float, unit: str) -> tuple[Link, ...]:
     """Return the link of a gauge pressure to the atmosphere; empty for any other number."""
     if not unit.endswith(_GAUGE) or path == ATMOSPHERE_PATH or fixed_zero(path):
         return ()
-    return (follows(ATMOSPHERE_PATH, to_si(value, unit, _LEVEL, 0.0)),)
+    return (follows(ATMOSPHERE_PATH, to_si(value, unit, LEVEL, 0.0)),)
 
 
 def acting(graph: Graph, given: Collection[str], turned: Collection[str] = ()) -> dict[str, Link]:

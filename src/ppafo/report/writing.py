@@ -78,10 +78,8 @@ def quantity(value: float | None, unit: str, digits: int = 4) -> str:
     """
     if value is None:
         return UNKNOWN
-    if value == 0.0 or (unit == "-" and value == int(value)):
-        number = f"{value:.0f}"
-    else:
-        number = f"{value:#.{digits}g}".removesuffix(".")
+    is_whole = value == 0.0 or (unit == "-" and value == int(value))
+    number = f"{value:.0f}" if is_whole else f"{value:#.{digits}g}".removesuffix(".")
     return f"{number} {'' if unit == '-' else unit}".rstrip()
 
 

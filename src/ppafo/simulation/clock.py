@@ -25,8 +25,8 @@ _RELATIVE = 1.0e-9
 _DURATION, _STEP, _OUTPUT = RUN
 _LONGEST_STEP = 1.0e-3
 _DURATION_PATH, _STEP_PATH, _OUTPUT_PATH = (f"run.{item.name}" for item in RUN)
-_RATE_PATH, _PERIOD_PATH = "controller.rate", "controller.period"
-TIMES = (_DURATION_PATH, _STEP_PATH, _OUTPUT_PATH, _RATE_PATH, _PERIOD_PATH)
+RATE_PATH, PERIOD_PATH = "controller.rate", "controller.period"
+TIMES = (_DURATION_PATH, _STEP_PATH, _OUTPUT_PATH, RATE_PATH, PERIOD_PATH)
 """Paths that decide the clock of a run."""
 
 
@@ -40,7 +40,7 @@ def read_clock(reading: DocumentReader) -> tuple[float, float, float, float]:
     until = f"{_DURATION_PATH} = {reading.written(_DURATION_PATH)}"
     period, given = read_period(reading)
     if not given:
-        raise ScenarioError(f"{reading.file}: '{_RATE_PATH}' is missing: give for example rate = '1 kHz', or a period")
+        raise ScenarioError(f"{reading.file}: '{RATE_PATH}' is missing: give for example rate = '1 kHz', or a period")
     has_output = value_at(reading.document, _OUTPUT_PATH) is not None
     if value_at(reading.document, _STEP_PATH) is not None:
         step = reading.number(_STEP_PATH, _STEP)
@@ -74,18 +74,18 @@ def read_clock(reading: DocumentReader) -> tuple[float, float, float, float]:
 
 def read_period(reading: DocumentReader, default: float = 0.0) -> tuple[float, str]:
     """Return the sample period of the controller [s], and how the document gives it; else the default and ""."""
-    if value_at(reading.document, _RATE_PATH) is not None:
-        period = 1.0 / reading.number(_RATE_PATH, RATE)
-        return period, f"the period of {_RATE_PATH} = {reading.written(_RATE_PATH)} ({1.0e3 * period:.6g} ms)"
-    if value_at(reading.document, _PERIOD_PATH) is None:
+    if value_at(reading.document, RATE_PATH) is not None:
+        period = 1.0 / reading.number(RATE_PATH, RATE)
+        return period, f"the period of {RATE_PATH} = {reading.written(RATE_PATH)} ({1.0e3 * period:.6g} ms)"
+    if value_at(reading.document, PERIOD_PATH) is None:
         return default, ""
-    return reading.number(_PERIOD_PATH, PERIOD), f"{_PERIOD_PATH} = {reading.written(_PERIOD_PATH)}"
+    return reading.number(PERIOD_PATH, PERIOD), f"{PERIOD_PATH} = {reading.written(PERIOD_PATH)}"
 
 
 def links_of_times(document: Mapping[str, Any]) -> Graph:
     """Return the links of the step and the output interval to the other times, if the document does not give them."""
     step, output = (value_at(document, path) is not None for path in (_STEP_PATH, _OUTPUT_PATH))
-    sources, found = (_DURATION_PATH, _PERIOD_PATH), dict[str, tuple[Link, ...]]()
+    sources, found = (_DURATION_PATH, PERIOD_PATH), dict[str, tuple[Link, ...]]()
     if not step:
         with_output = Link((*sources, _OUTPUT_PATH), step_with_output)
         found[_STEP_PATH] = (with_output if output else Link(sources, step_unless_given),)

@@ -13,7 +13,7 @@ from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.declaration import PlainFunction, Quantity
 from ppafo.model.gas import critical_pressure_ratio
 from ppafo.parameters.device import VANE, Orifice, SonicOrifice
-from ppafo.parameters.graph import Link, follows
+from ppafo.parameters.graph import GAS_PATHS, Link, follows
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.torque_loop import (
     GROUPS,
@@ -27,7 +27,6 @@ from ppafo.simulation.torque_loop import (
 
 SLOPE_GAINS = ("derivative_gain", "damping")
 """Gains on the rate of the error, which are 0 by default for every device."""
-_GAS_PATHS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
 _GAS_PRODUCT_PATHS = ("gas.molar_mass", "gas.temperature")
 _SAME_NUMBERS = {
     "supply_pressure": "supply.pressure",
@@ -81,7 +80,7 @@ def nominal_links(parts: LoopParts) -> dict[str, Link]:
         "leak_conductance": _conductance("actuator.leak", device.actuator.leak),
         "critical_ratio": follows("valve.critical_ratio")
         if parts.is_sonic
-        else Link(_GAS_PATHS[1:2], critical_pressure_ratio),
+        else Link(GAS_PATHS[1:2], critical_pressure_ratio),
         "converter_range": Link(("supply.pressure", "supply.dorsiflexion_pressure"), converter_range),
         # A link needs a source: here it is multiplied by 0.
         "dead_band": follows("valve.dead_band")
@@ -106,7 +105,7 @@ def _conductance(section: str, orifice: Orifice | SonicOrifice) -> Link:
     """Return the link to the conductance [kg/(s Pa)] of an orifice."""
     if isinstance(orifice, SonicOrifice):
         return Link((*_GAS_PRODUCT_PATHS, f"{section}.sonic_conductance"), conductance_of_sonic)
-    return Link((*_GAS_PATHS, f"{section}.area", f"{section}.discharge_coefficient"), conductance_of_area)
+    return Link((*GAS_PATHS, f"{section}.area", f"{section}.discharge_coefficient"), conductance_of_area)
 
 
 def opening_beyond_band(loop: TorqueLoop, dead_zone: float, dead_band: float) -> float:

@@ -14,6 +14,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION as EFFECT_SETTINGS
 from ppafo.parameters.declaration import (
     AREA_FORM,
+    FLAT_SECTIONS,
     OF_SECOND_CHAMBER,
     ORIFICE,
     SONIC_FORM,
@@ -25,6 +26,7 @@ from ppafo.parameters.device import Device, Orifice, SonicOrifice, held_in
 from ppafo.parameters.effects import number_under, part_of
 from ppafo.parameters.graph import Asked, Graph, Link, left, resolved
 from ppafo.parameters.overrides import one_path, read_overrides
+from ppafo.simulation.clock import PERIOD_PATH, RATE_PATH
 from ppafo.simulation.declaration import LOCKED_ANGLE
 from ppafo.simulation.default_gains import default_links
 from ppafo.simulation.profiles import disordered_knots, profiles_of
@@ -33,13 +35,11 @@ from ppafo.units import SI
 from ppafo.units.shown import in_units, written_text
 
 _Item = TypeVar("_Item")
-_DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
-_OF_DEVICE = (*_DEVICE_SECTIONS, "valve", EFFECT_SETTINGS)
+_OF_DEVICE = (*FLAT_SECTIONS, "valve", EFFECT_SETTINGS)
 ORIFICES = {"valve": ("device", "valve", "orifice"), "actuator.leak": ("device", "actuator", "leak")}
 
 NOISE_SEED = "sensors.seed"
 """Path of the seed of the sensor noise, the only whole number."""
-_RATE, _PERIOD = "controller.rate", "controller.period"
 
 
 _OF_JOINT = ("actuator.", "friction.", "foot_plate.")
@@ -70,7 +70,7 @@ def check_parts(scenario: Scenario) -> None:
         raise refusal("motion", scenario.motion, "must be a motion object such as FreeMotion")
     if scenario.controlled not in CONTROLLED:
         raise refusal("controlled", scenario.controlled, f"must be one of {', '.join(CONTROLLED)}")
-    absent = _numbers_of_other_form(scenario.device) | {_RATE}
+    absent = _numbers_of_other_form(scenario.device) | {RATE_PATH}
     to_float, named_effects = taken_number(), scenario.device.effects
     for path, quantity in declared_numbers(scenario).items():
         section, _, name = path.partition(".")
@@ -95,7 +95,7 @@ def check_parts(scenario: Scenario) -> None:
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declarations of all numbers of a scenario and its device, by path; both forms of each orifice."""
     device, kind = scenario.device, scenario.device.actuator.kind
-    declared = [(section, quantity) for section in _DEVICE_SECTIONS for quantity in members(section, kind)]
+    declared = [(section, quantity) for section in FLAT_SECTIONS for quantity in members(section, kind)]
     declared += [("actuator.leak", quantity) for quantity in ORIFICE]
     declared += [(effect.section, quantity) for effect in device_effects() for quantity in effect.quantities]
     declared += [("valve", quantity) for quantity in (*ORIFICE, *VALVES[device.valve.kind].quantities)]
@@ -148,7 +148,7 @@ def moving_together(scenario: Scenario, replaced: Mapping[str, Any]) -> dict[str
     Numbers changed since the scenario was loaded no longer follow others.
     """
     # Numbers that follow the sample period follow a rate that is given for it.
-    period = {_PERIOD: 1.0 / replaced[_RATE]} if _RATE in replaced and _PERIOD not in replaced else {}
+    period = {PERIOD_PATH: 1.0 / replaced[RATE_PATH]} if RATE_PATH in replaced and PERIOD_PATH not in replaced else {}
     moved, _, _ = _moved(scenario, {**replaced, **period})
     return {path: number for path, number in moved.items() if path not in period}
 
@@ -189,9 +189,9 @@ def present_numbers(scenario: Scenario) -> dict[str, float]:
     numbers = {}
     for path in declared_numbers(scenario):
         section, _, name = path.partition(".")
-        if path not in absent and path != _RATE and (section != EFFECT_SETTINGS or name.partition(".")[0] in named):
+        if path not in absent and path != RATE_PATH and (section != EFFECT_SETTINGS or name.partition(".")[0] in named):
             numbers[path] = number_at(scenario, path)
-    return {**numbers, _RATE: 1.0 / numbers[_PERIOD]}
+    return {**numbers, RATE_PATH: 1.0 / numbers[PERIOD_PATH]}
 
 
 def number_at(scenario: Scenario, path: str) -> float:

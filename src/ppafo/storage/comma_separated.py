@@ -25,10 +25,10 @@ from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.signals.recording import BETWEEN, PLAIN_NUMBER, TIME, TIME_UNIT, Between, Floats
 from ppafo.storage.files import read_bytes, text_of, write_file
+from ppafo.units import LEVEL
 from ppafo.wording import LONGEST_SHOWN, finite_number, first_twice, nearest_name, one_line
 
 _HEADER = re.compile(r"\s*(\w+)\s*\[\s*([^\[\]]+?)\s*\]\s*(\w*)\s*", re.ASCII)
-_LEVEL = "Pa_a"
 _ONLY_SIMULATED = "supplied_mass"
 _MAPPED = "; other names are read through a column map"
 _NO_TIMES = f'for a table without a time column, give the sample rate in the map: {TIME} = {{ rate = "100 Hz" }}'
@@ -84,7 +84,7 @@ def parse_header(cells: list[str]) -> list[HeaderColumn]:
                 f"the header must name columns as 'name [unit]', separated by commas, not as '{shown}'"
                 f"{_MAPPED}, for another delimiter or a decimal comma too"
             )
-        name, unit, word = match[1], "Pa" if match[2] == _LEVEL else match[2], match[3]
+        name, unit, word = match[1], "Pa" if match[2] == LEVEL else match[2], match[3]
         # Time itself does nothing between its samples.
         between = next((known for known in BETWEEN if word == known and name != TIME), None)
         if word and between is None:
@@ -124,7 +124,7 @@ def check_clock(time: Floats, lines: Sequence[int], noun: str = "line") -> None:
         )
 
 
-_SPELT = {"Pa": _LEVEL, PLAIN_NUMBER: ""}
+_SPELT = {"Pa": LEVEL, PLAIN_NUMBER: ""}
 """Unit names as ``ppafo.units`` requires: pressure with its kind, no unit for a plain number."""
 _MARKS: dict[RecordingKind, str] = {
     "simulated": "# simulated: a model's own output, not measured",
@@ -153,7 +153,7 @@ def csv_bytes(recording: Recording) -> bytes:
     writer = csv.writer(buffer, lineterminator="\n")
     # A pressure states that it is absolute.
     heads = [
-        f"{name} [{_LEVEL if channel.unit == 'Pa' else channel.unit}] {channel.between or ''}".rstrip()
+        f"{name} [{LEVEL if channel.unit == 'Pa' else channel.unit}] {channel.between or ''}".rstrip()
         for name, channel in recording.channels.items()
     ]
     writer.writerow([f"{TIME} [{TIME_UNIT}]", *heads])

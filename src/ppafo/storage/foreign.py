@@ -265,10 +265,11 @@ def read_trials(
             raise DataError("is a NetCDF file, which names its own channels and units: read it without a column map")
         with in_map(map_name):
             check_sources(columns)
-        if isinstance(content, bytes):
-            table = read_mapped_text(content, columns, map_name)
-        else:
-            table = read_mapped_matlab(content, columns, map_name)
+        table = (
+            read_mapped_text(content, columns, map_name)
+            if isinstance(content, bytes)
+            else read_mapped_matlab(content, columns, map_name)
+        )
         with in_map(map_name):
             faults, channels = list[PpafoError](), dict[str, Channel]()
             for name, mapped in columns.channels.items():

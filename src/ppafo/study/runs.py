@@ -160,11 +160,10 @@ def scenario_runs(
     Paths in ``gauge`` hold gauge pressures relative to the atmosphere of each run.
     """
     check_metrics(metrics, scenario)
-    evaluate = partial(run_judged, scenario, tuple(metrics), frozenset(gauge))
-    if executor is None:
-        evaluate = partial(evaluate, threads, count=counter.count_ended)
-    else:
-        evaluate = partial(evaluate, threads or 1)
+    judged = partial(run_judged, scenario, tuple(metrics), frozenset(gauge))
+    evaluate = (
+        partial(judged, threads, count=counter.count_ended) if executor is None else partial(judged, threads or 1)
+    )
     is_slow = scenario.controller.custom is not None
     at_once = _SLOW_AT_ONCE if is_slow else runs_at_once(scenario, _AT_ONCE)
     return Runs(evaluate, counter, at_once, executor)

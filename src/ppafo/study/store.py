@@ -37,6 +37,7 @@ from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import scenario_document
 from ppafo.simulation.tracking.rule import ON_PURPOSE
 from ppafo.storage.files import LEFT_ASIDE, is_address, write_file
+from ppafo.storage.owned_folder import HASHES
 from ppafo.storage.parquet import encode_texts, encode_truths, parquet_bytes, read_parquet
 from ppafo.storage.result_folder import MANIFEST
 from ppafo.studies.distributions import Floats
@@ -50,7 +51,6 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 STUDY_COPY, FORMAT, SCHEMA_VERSION = "study.toml", "ppafo study results", 3
-_HASH = "sha256"
 _MAXIMUM_BYTES_OF_DOCUMENT = 100_000_000
 """Largest document that is read [bytes]; documents of studies are far smaller."""
 _LONGEST_WRITING = 86400.0
@@ -168,12 +168,12 @@ class StudyFolder:
 
     def write_document(self, name: str, document: Mapping[str, Any]) -> None:
         """Write a JSON document with its own hash."""
-        self.write(name, f"{json_text({**document, _HASH: hash_of(document)})}\n".encode())
+        self.write(name, f"{json_text({**document, HASHES: hash_of(document)})}\n".encode())
 
     def document(self, name: str) -> dict[str, Any]:
         """Return a JSON document without its hash; ValueError unless the hash is that of the document."""
         document = json_document(read_regular_file(self.path / name, _MAXIMUM_BYTES_OF_DOCUMENT))
-        if not isinstance(document, dict) or document.pop(_HASH, None) != hash_of(document):
+        if not isinstance(document, dict) or document.pop(HASHES, None) != hash_of(document):
             raise ValueError("does not have the content that was written")
         return document
 
@@ -209,7 +209,7 @@ class StudyFolder:
     def _check(self, name: str, digest: str) -> None:
         """Raise OSError or ValueError unless a file is there and has a SHA-256."""
         with (self.path / name).open("rb") as file:
-            if hashlib.file_digest(file, _HASH).hexdigest() != digest:
+            if hashlib.file_digest(file, HASHES).hexdigest() != digest:
                 raise ValueError("does not have the content that was written")
         self.sound.add(name)
 

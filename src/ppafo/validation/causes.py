@@ -23,9 +23,10 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 
-from ppafo.errors import PpafoError
+from ppafo.errors import ParameterError, PpafoError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.model.declaration import Quantity
+from ppafo.parameters.building import contradictions
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.progress import Progress, Report, report_nothing
@@ -145,6 +146,8 @@ _TOGETHER = 32
 """Number of changes replayed in a batch, which limits memory and sets the rate of progress reports."""
 _DIFFERENCE = 0.02
 """Step of a finite difference as a fraction of the distance between two trial magnitudes [-]."""
+_FINE_DIFFERENCE = 0.002
+"""The same after a step that made the error worse [-]: a valve may have switched once more, which is no slope."""
 _BEST, _OF_BEST, _OF_RISING = 6, 2, 4
 """Number of candidates that are nearest after the steps of all, and their further Gauss-Newton steps.
 
@@ -905,16 +908,19 @@ class CauseSearch:
             improved = [cause for cause in best.values() if cause.has_size]
             if step >= STEPS:
                 improved = sorted(improved, key=lambda cause: -cause.gain)[:_BEST]
-            if step >= STEPS + _OF_BEST:
-                improved = [cause for cause in improved if cause.name in rising]
+            is_last = step >= STEPS + _OF_BEST
+            if is_last:
+                improved = [cause for cause in improved if cause.name in rising or cause is improved[0]]
             if step == STEPS + _OF_BEST + _OF_RISING:
                 break
-            # A step that went too far is taken again, shorter; the others end between neighbours on their grids.
-            again = [cause for cause in improved if cause.name in worse]
+            # A step that went too far is taken again, shorter; at last from a finer difference, which may see another
+            # slope. The others end between neighbours on their grids.
+            again = [cause for cause in improved if cause.name in worse and not is_last]
             trials = [(cause, cause.size + _SHORTER * (worse[cause.name] - cause.size)) for cause in again]
             moved = list[_Trial]()
-            for cause in (cause for cause in improved if cause.name not in worse):
-                length = _DIFFERENCE * (cause.neighbours[1] - cause.neighbours[0])
+            for cause in (cause for cause in improved if cause not in again):
+                share = _FINE_DIFFERENCE if is_last else _DIFFERENCE
+                length = share * (cause.neighbours[1] - cause.neighbours[0])
                 moved.append((cause, cause.at(cause.size + length), length))
             for cause in self._slopes(moved):
                 low, high = cause.neighbours
@@ -1101,8 +1107,8 @@ def _request(record: Record, change: ModelChange) -> Replay:
             values = np.clip(values, -1.0, 1.0) if name == COMMAND else values
             recording = recording.with_channel(name, values, recording.unit(name))
     if change.is_swapped:
-        channels = recording.channels
-        recording = replace(recording, channels={**channels, **{name: channels[of] for name, of in SWAPPED.items()}})
+        swapped = {name: recording.channels[of] for name, of in SWAPPED.items()}
+        recording = replace(recording, channels={**recording.channels, **swapped})
     if change.clock != 1.0:
         recording = at_rate(recording, change.clock)
     if change.start is not None:
@@ -1110,17 +1116,22 @@ def _request(record: Record, change: ModelChange) -> Replay:
         for name, values, good in zip(record.channels, record.values * record.noise[:, None], record.good, strict=True):
             valid = values[:count][good[:count] > 0.0]
             if name in SENSORS and len(valid) < count:
-                low, high = supply.atmospheric_pressure, max(supply.pressure, supply.dorsiflexion_pressure)
-                if name == ANGLE:
-                    low, high = actuator.angle_min, actuator.angle_max
+                stops = (actuator.angle_min, actuator.angle_max)
+                highest = max(supply.pressure, supply.dorsiflexion_pressure)
+                low, high = stops if name == ANGLE else (supply.atmospheric_pressure, highest)
                 initial.setdefault(name, float(valid.mean()) if len(valid) else low + change.start * (high - low))
-    settings = replace(settings, initial=initial, motion=change.motion or settings.motion)
-    request = replay_of(replace(measured, recording=recording), device, settings)
+    started = replace(settings, initial=initial, motion=change.motion or settings.motion)
+    request = replay_of(replace(measured, recording=recording), device, started)
     device = replace(request.device, effects={**request.device.effects, **change.effects})
     if change.numbers:
         scenario = replace(replayed_scenario(request), device=device)
         device = with_numbers(scenario, change.numbers).device
-    return replace(request, device=device)
+        for _, (is_bad, line) in contradictions(device):
+            if is_bad:
+                raise ParameterError(line(0))
+    # Stops that a change moves hold the joint from the start.
+    angle = min(max(request.start.angle, device.actuator.angle_min), device.actuator.angle_max)
+    return replace(request, device=device, start=replace(request.start, angle=angle))
 
 
 def _bounded(causes: Sequence[Cause], errors: Floats) -> list[Cause]:

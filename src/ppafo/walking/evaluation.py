@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.engine.channels import REQUEST
 from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.run import Run
 from ppafo.metrics import METRICS, evaluate
@@ -37,7 +38,7 @@ from ppafo.walking.strides import (
     stride_starts,
 )
 
-_PHASE_ROW, _REQUEST_ROW = "controller_state.phase.phase", "controller_state.request.torque"
+_PHASE_ROW = "controller_state.phase.phase"
 """Paths of the rows for gait phase and requested torque of a controller that has them."""
 
 
@@ -107,8 +108,8 @@ def recording_of_walk(
         channels["bottle_mass"] = (supply.met[0].state.mass - record["line_state.regulated_mass"], "kg")
     if _PHASE_ROW in record:
         channels["controller_phase"] = (record[_PHASE_ROW], "-")
-    if _REQUEST_ROW in record:
-        channels["reference"] = (record[_REQUEST_ROW], "N m")
+    if REQUEST in record:
+        channels["reference"] = (record[REQUEST], "N m")
     return recording_of(f"walk, {scenario.name}", run, time, channels)
 
 

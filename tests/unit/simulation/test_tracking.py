@@ -407,7 +407,7 @@ NO_GAIN = ["controller.proportional_gain=0 1/Pa", "controller.integral_gain=0 1/
         ("torque-task-solenoid", PARTLY, "with a larger valve", "valve.area="),
         ("cylinder-servo", ["valve.spool_frequency=3 Hz"], "is most of the loop's delay of 77.8 ms", "frequency="),
         ("cylinder-servo", ["controller.rate=20 Hz"], "rate = 20 Hz` is most of the loop's", "controller.rate="),
-        ("cylinder-servo", HELD, "`controller.angle_stiffness = 4 N m/rad`", "controller.angle_stiffness="),
+        ("cylinder-servo", HELD, "with the default settings of the controller", "controller.angle_stiffness="),
         ("cylinder-servo", TOLERANT, "controller.tolerance = 1 deg`", "controller.tolerance="),
         ("cylinder-servo", LATE_SINE, "`sensors.delay = 15 ms`", ""),
         ("solenoid", ["run.duration=6 s", "valve.area=0.0126 mm^2"], "with a larger valve", "valve.area="),

@@ -44,7 +44,6 @@ from ppafo.version import __version__
 from ppafo.walking import WalkResult
 from ppafo.walking.bottle.coupling import (
     ABOVE_FREEZING,
-    LARGEST_DRAW,
     LEAST_FLOW,
     OPEN,
     RESTING,
@@ -78,6 +77,8 @@ _NEXT_TO_NOTHING = 0.01
 """Usable gas at room temperature, as a fraction of a full bottle, below which a bottle counts as empty [-]."""
 _SHORTEST = 1.0e-3
 """Time [s] to which the end of a bottle is found."""
+_LARGEST_DRAW = 0.01
+"""Largest fraction of the gas drawn in one step [-]: an insulated bottle ends within 0.01 K of its isentrope."""
 _FASTEST = 20.0
 """Largest thermal rate [1/s] of a bottle that is drawn for hours."""
 
@@ -240,7 +241,7 @@ def _drain(course: SupplyCourse, mean_flow: float, peak_flow: float, schedule: S
         length = RESTING
         while (now := course.met[-1]).time < end:
             rest = end - now.time
-            largest = LARGEST_DRAW * now.state.mass / max(flow, LEAST_FLOW)
+            largest = _LARGEST_DRAW * now.state.mass / max(flow, LEAST_FLOW)
             length = min(length, rest, largest)
             time = end if length == rest else now.time + length
             later = met_again(course.supply, now, flow * length, length, time)

@@ -42,7 +42,7 @@ from ppafo.units import from_si
 from ppafo.units.spelling import molar_mass_in
 from ppafo.wording import known_names
 
-_VALVE_PRESSURES = ("upstream_pressure", "downstream_pressure")
+VALVE_PRESSURES = ("upstream_pressure", "downstream_pressure")
 _MINIMUM_SAMPLES = 5
 _FULLY_OPEN = 0.99
 _FEW = 10
@@ -386,7 +386,7 @@ def solve_flow(
 class OpenValveFlowProblem(FlowLaw):
     """Table of procedure open-valve-flow: Cd, or C and b of ISO 6358, of the fully open valve."""
 
-    needed = (*_VALVE_PRESSURES, "mass_flow")
+    needed = (*VALVE_PRESSURES, "mass_flow")
     steady = ("open-valve-flow",)
     kind: Literal["open-valve-flow"]
     valve: str | None = keyed(VALVE, None)
@@ -401,11 +401,11 @@ class OpenValveFlowProblem(FlowLaw):
         """
         gas, path, zero = self.gas_of(sources, context), context.valve_path(self.valve), context.tolerances.zero_of_flow
         area, critical_ratio = (context.number(f"{path}.{name}") for name in ("area", "critical_ratio"))
-        readings.check_sources(sources, _MINIMUM_SAMPLES, absolute=_VALVE_PRESSURES)
+        readings.check_sources(sources, _MINIMUM_SAMPLES, absolute=VALVE_PRESSURES)
         commands = []
         for source in sources:
             # A saturated meter shows a constant flow although the pressures change the flow.
-            upstream, downstream = (source.recording[name] for name in _VALVE_PRESSURES)
+            upstream, downstream = (source.recording[name] for name in VALVE_PRESSURES)
             driving = orifice_shape(upstream, downstream, gas.heat_capacity_ratio)
             readings.check_not_clipped(source, "mass_flow", "orifice flow at these pressures", driving)
             # In a recording without commands, the valve is taken to be open.
@@ -431,7 +431,7 @@ class OpenValveFlowProblem(FlowLaw):
             )
         if np.ptp(flow[is_open]) <= 0.0:
             readings.check_moves(sources[0], "mass_flow")
-        pressures, flow, recorded, meter_remarks = steady_readings(sources, _VALVE_PRESSURES, zero, is_open)
+        pressures, flow, recorded, meter_remarks = steady_readings(sources, VALVE_PRESSURES, zero, is_open)
         (upstream, downstream), flow = pressures.values(), np.abs(flow)
         ratio = downstream / upstream
         text = f"Discharge coefficient with the set's area of {1e6 * (area or 0.0):.4g} mm^2; only Cd A is identified"

@@ -19,7 +19,7 @@ import numpy as np
 
 from ppafo.identification.bench import flow, readings
 from ppafo.identification.bench import law as bench
-from ppafo.identification.bench.flow import VALVE, ZERO
+from ppafo.identification.bench.flow import VALVE, VALVE_PRESSURES, ZERO
 from ppafo.identification.estimate import Verdict
 from ppafo.identification.fit import SHAPE, FitNumber, other_shape
 from ppafo.identification.source import RecordingSource, Sources, pool
@@ -33,7 +33,6 @@ from ppafo.report.residuals import curve_mark, with_residuals
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.channels import check_command
 
-_PRESSURES = ("upstream_pressure", "downstream_pressure")
 _MINIMUM_SAMPLES = 12
 _MINIMUM_RANGE = 0.5
 """Least range of the command [-] to separate dead band and gain."""
@@ -58,7 +57,7 @@ _BETTER = 5.4
 class ValveMapProblem(flow.FlowLaw):
     """Table of procedure valve-map: dead band, gain, saturation and hysteresis from flow over command."""
 
-    needed = ("command", "mass_flow", *_PRESSURES)
+    needed = ("command", "mass_flow", *VALVE_PRESSURES)
     steady = ("valve-map",)
     kind: Literal["valve-map"]
     valve: str | None = keyed(VALVE, None)
@@ -71,8 +70,8 @@ class ValveMapProblem(flow.FlowLaw):
         IdentificationError for recordings that do not determine the map.
         """
         gas, path = self.gas_of(sources, context), context.valve_path(self.valve)
-        readings.check_sources(sources, _MINIMUM_SAMPLES, ("command", "mass_flow"), absolute=_PRESSURES)
-        command, upstream, downstream = (pool(sources, name) for name in ("command", *_PRESSURES))
+        readings.check_sources(sources, _MINIMUM_SAMPLES, ("command", "mass_flow"), absolute=VALVE_PRESSURES)
+        command, upstream, downstream = (pool(sources, name) for name in ("command", *VALVE_PRESSURES))
         is_read = np.ones(command.size, dtype=bool)
         measured, is_possible, remarks = readings.meter_readings(
             sources, np.sign(command * (upstream - downstream)), context.tolerances.zero_of_flow, is_read
@@ -95,7 +94,7 @@ class ValveMapProblem(flow.FlowLaw):
         highest = size.max()
         band = f"{path}.dead_band"
         openings = [f"{SECTION}.opening.opening_{number:02}" for number in range(1, len(self.nodes) + 1)]
-        pressures = dict(zip(_PRESSURES, (upstream, downstream), strict=True))
+        pressures = dict(zip(VALVE_PRESSURES, (upstream, downstream), strict=True))
         between = "Hysteresis: width between rising and falling command"
         play = bench.sought(_PLAY, 0.02, 0.0, 0.5, 0.1, text=between, size=_SMALL_COMMAND)
         numbers = (

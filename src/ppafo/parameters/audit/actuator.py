@@ -12,7 +12,7 @@ from ppafo.model.plant import pressure_for_torque
 from ppafo.parameters.audit.evidence import AuditFinding, Evidence, ReportedRange, Severity, of_each_valve
 from ppafo.parameters.building import build_device
 from ppafo.parameters.device import VANE
-from ppafo.parameters.graph import ATMOSPHERE_PATH
+from ppafo.parameters.graph import ATMOSPHERE_PATH, DISPLACEMENT_PATH, PRESSURE_PATH, TORQUE_CONSTANT_PATH
 from ppafo.parameters.reach import torque_reach
 from ppafo.units import from_si, to_si
 from ppafo.units.shown import shown_in, shown_unit, shown_value
@@ -22,12 +22,10 @@ _DECAY, _DECAY_INVERSE = "reported.acceleration_over_velocity", "reported.veloci
 _DECELERATION = "reported.stopping_deceleration"
 _SHIFTS = (-3, -2, -1, 1, 2, 3)
 """Powers of ten of a misplaced decimal point or a wrong prefix."""
-_TORQUE_CONSTANT, _DISPLACEMENT = "actuator.torque_constant", "actuator.displacement_per_radian"
 _STOPS = ("actuator.angle_min", "actuator.angle_max")
 _DEAD = ("actuator.dead_volume_1", "actuator.dead_volume_2")
 _LEVER = ("actuator.lever_length", "actuator.base_distance", "actuator.lever_offset")
 _SUPPLIES = ("supply.pressure", "supply.dorsiflexion_pressure", "reported.other_supply_pressure")
-_SUPPLY = _SUPPLIES[0]
 _DEMAND, _STATIC = "reported.demanded_torque", "friction.static_torque"
 _TOLERANCE = 0.1
 """Relative difference [-] from which two reported numbers of one or two digits differ for certain."""
@@ -112,7 +110,7 @@ def _one_filling(evidence: Evidence) -> tuple[str, float, float]:
 
     Raises ParameterError if the set reports no such gas, or a supply that fills nothing.
     """
-    gas, (supply,) = evidence.gas(), evidence.numbers(_SUPPLY)
+    gas, (supply,) = evidence.gas(), evidence.numbers(PRESSURE_PATH)
     paths = (f"reported.valves.{name}.single_fill_gas" for name in evidence.parameter_set.valve_kinds)
     path = next((path for path in paths if evidence.number(path)), "")
     if supply <= evidence.atmosphere() or not path:
@@ -126,7 +124,7 @@ def virtual_work(evidence: Evidence) -> Iterator[AuditFinding]:
 
     Equations (2) to (5): by virtual work, T dtheta = (P1 - P2) dV, both are equal.
     """
-    paths = [_TORQUE_CONSTANT, _DISPLACEMENT, "reported.torque_efficiency"]
+    paths = [TORQUE_CONSTANT_PATH, DISPLACEMENT_PATH, "reported.torque_efficiency"]
     (constant, displacement), efficiency = evidence.positive(*paths[:2]), evidence.number(paths[2])
     if efficiency is not None and abs(displacement * efficiency / constant - 1.0) <= _TOLERANCE:
         yield evidence.finding(
@@ -143,7 +141,7 @@ def virtual_work(evidence: Evidence) -> Iterator[AuditFinding]:
         with contextlib.suppress(ParameterError):
             path, used, density = _one_filling(evidence)
             low_path, low, high_path, high = evidence.angle_range()
-            paths += [path, _SUPPLY, low_path, high_path]
+            paths += [path, PRESSURE_PATH, low_path, high_path]
             sides |= {
                 "gas that fills a volume from atmosphere to supply": (density, "kg/m^3"),
                 "volume that the gas use needs": (used / density, "m^3"),
@@ -165,7 +163,7 @@ def virtual_work(evidence: Evidence) -> Iterator[AuditFinding]:
 
 def volumes(evidence: Evidence) -> Iterator[AuditFinding]:
     """Name each chamber whose volume is not positive at one end of the angles in use; equations (4) and (5)."""
-    (slope,), (stop_low, stop_high) = evidence.positive(_DISPLACEMENT), evidence.numbers(*_STOPS)
+    (slope,), (stop_low, stop_high) = evidence.positive(DISPLACEMENT_PATH), evidence.numbers(*_STOPS)
     low_path, low, high_path, high = evidence.angle_range()
     turn = high - low
     for index, (travel, path, end) in enumerate(((low - stop_low, low_path, low), (stop_high - high, high_path, high))):
@@ -175,7 +173,7 @@ def volumes(evidence: Evidence) -> Iterator[AuditFinding]:
             yield evidence.finding(
                 f"volume-{index + 1}",
                 f"volume of chamber {index + 1} is not positive over the range of angles",
-                [_DISPLACEMENT, _STOPS[index], _DEAD[index], path],
+                [DISPLACEMENT_PATH, _STOPS[index], _DEAD[index], path],
                 {
                     f"V{index + 1} at the end of the range": (dead + slope * travel, "m^3"),
                     "smallest sufficient dead volume": (-slope * travel, "m^3"),
@@ -256,7 +254,7 @@ def filling(evidence: Evidence) -> Iterator[AuditFinding]:
     yield evidence.finding(
         "gas-of-one-filling",
         f"the measured gas of one filling {'fits' if agrees else 'does not fit'} the volume of chamber 1",
-        [_DISPLACEMENT, _DEAD[0], path, _SUPPLY],
+        [DISPLACEMENT_PATH, _DEAD[0], path, PRESSURE_PATH],
         {
             "gas that fills chamber 1": (density * volume, "kg"),
             "measured gas": (used, "kg"),
@@ -287,7 +285,7 @@ def vacuum(evidence: Evidence) -> Iterator[AuditFinding]:
 @of_each_valve
 def set_pressures(evidence: Evidence, valve: str) -> Iterator[AuditFinding]:
     """Note a pressure regulator that can be set above its supply, with the command from which it is."""
-    paths = [f"valves.{valve}.lowest_pressure", f"valves.{valve}.highest_pressure", _SUPPLY]
+    paths = [f"valves.{valve}.lowest_pressure", f"valves.{valve}.highest_pressure", PRESSURE_PATH]
     lowest, highest, supply = evidence.numbers(*paths)
     if lowest < supply < highest:
         share = (supply - lowest) / (highest - lowest)
@@ -305,7 +303,7 @@ def torque_ceiling(evidence: Evidence) -> Iterator[AuditFinding]:
 
     Equation (2). Of an actuator other than a vane it is the most and the least up and down between the stops.
     """
-    shown, constant = evidence.parameter_set.shown, evidence.number(_TORQUE_CONSTANT)
+    shown, constant = evidence.parameter_set.shown, evidence.number(TORQUE_CONSTANT_PATH)
     supplies = {path: value for path in _SUPPLIES if (value := evidence.number(path)) is not None}
     ceilings, why = dict[str, float](), list[str]()
     if supplies and evidence.parameter_set.actuator_kind != VANE:
@@ -342,7 +340,7 @@ def torque_ceiling(evidence: Evidence) -> Iterator[AuditFinding]:
     yield evidence.finding(
         "torque-ceiling",
         f"the supply allows at most {most} {torque_unit}",
-        [_TORQUE_CONSTANT, *supplies, _DEMAND, _STATIC],
+        [TORQUE_CONSTANT_PATH, *supplies, _DEMAND, _STATIC],
         {label: (torque, "N m") for label, torque in ceilings.items()},
         " ".join(why),
         severity,
@@ -352,7 +350,7 @@ def torque_ceiling(evidence: Evidence) -> Iterator[AuditFinding]:
 def published_torque(evidence: Evidence) -> Iterator[AuditFinding]:
     """Compare each published torque with the torque constant, and the one of walking with the time of a push-off."""
     for name in ("rated", "walking"):
-        paths = [_TORQUE_CONSTANT, f"reported.{name}_torque", f"reported.{name}_torque_pressure"]
+        paths = [TORQUE_CONSTANT_PATH, f"reported.{name}_torque", f"reported.{name}_torque_pressure"]
         with contextlib.suppress(ParameterError):
             constant, torque, pressure = evidence.positive(*paths)
             if pressure <= evidence.atmosphere():
@@ -376,7 +374,9 @@ def while_walking(evidence: Evidence, valve: str) -> Iterator[AuditFinding]:
     """Compare the time in which a valve fills chamber 1 at toe-off for the torque of walking with a push-off."""
     paths = [f"valves.{valve}.area", f"valves.{valve}.discharge_coefficient", "reported.walking_torque_pressure"]
     gas, volume, atmosphere = evidence.gas(), evidence.chamber_1_volume(_TOE_OFF), evidence.atmosphere()
-    area, coefficient, supply, torque, constant = evidence.positive(*paths, "reported.walking_torque", _TORQUE_CONSTANT)
+    area, coefficient, supply, torque, constant = evidence.positive(
+        *paths, "reported.walking_torque", TORQUE_CONSTANT_PATH
+    )
     k, product = gas.heat_capacity_ratio, gas.specific_gas_constant * gas.temperature
     choked = area_conductance(area, coefficient, k, gas.specific_gas_constant, gas.temperature) * supply
     target = atmosphere + _REACHED * min(pressure_for_torque(torque, constant), supply - atmosphere)
@@ -387,7 +387,7 @@ def while_walking(evidence: Evidence, valve: str) -> Iterator[AuditFinding]:
     yield evidence.finding(
         f"walking-torque-in-time-{valve}",
         f"valve '{valve}' fills chamber 1 {'within' if time <= _PUSH_OFF else 'too slowly for'} a push-off",
-        [_DISPLACEMENT, _DEAD[0], *paths],
+        [DISPLACEMENT_PATH, _DEAD[0], *paths],
         {"time to fill": (time, "s"), "time of push-off": (_PUSH_OFF, "s")},
         f"{100.0 * _REACHED:.0f} % of the published walking torque are reached, with the volume at toe-off.",
         "note" if time <= _PUSH_OFF else "warning",

@@ -14,14 +14,13 @@ from ppafo.model.declaration import Quantity
 from ppafo.model.plant import chamber_1_volume
 from ppafo.parameters.declaration import fits, is_within
 from ppafo.parameters.device import Gas
-from ppafo.parameters.graph import ATMOSPHERE_PATH
+from ppafo.parameters.graph import ATMOSPHERE_PATH, GAS_PATHS
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, in_first_unit, number_in_si
 from ppafo.units import from_si
 from ppafo.units.shown import shown_unit
 from ppafo.units.spelling import DECIMALS
 
 Severity = Literal["error", "warning", "note"]
-GAS_PATHS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
 _SMALLEST, _LARGEST = 1e-20, 1e20
 """Limits of plausible SI magnitudes; products of larger numbers would overflow."""
 

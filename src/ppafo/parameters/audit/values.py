@@ -10,9 +10,10 @@ from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import ParameterError, UnitError
 from ppafo.model.gas import SECOND_VIRIAL, SPECIES, choked_flow_constant, critical_pressure_ratio
 from ppafo.model.orifice import subsonic_flow_constant
-from ppafo.parameters.audit.evidence import GAS_PATHS, AuditFinding, Evidence, identifier_of
+from ppafo.parameters.audit.evidence import AuditFinding, Evidence, identifier_of
 from ppafo.parameters.building import contradictions_of_set, missing_values, read_device
 from ppafo.parameters.declaration import is_within
+from ppafo.parameters.graph import GAS_PATHS
 from ppafo.parameters.parameter_set import entry_in_si, entry_text, number_in_si
 from ppafo.parameters.publications.publication import FILE, read_publication
 from ppafo.units import split_number, to_si

@@ -18,6 +18,7 @@ from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.plant import gravity_torque
 from ppafo.parameters.graph import PRESSURE_PATH, Asked
 from ppafo.parameters.reach import static_torque, supply_that_moves, torque_reach
+from ppafo.simulation.clock import RATE_PATH
 from ppafo.simulation.gains import loop_of
 from ppafo.simulation.numbers import declared_numbers, number_at
 from ppafo.simulation.profiles import profile_bounds
@@ -32,7 +33,7 @@ LARGER_VALVE, SMALLER_VALVE = "with a larger valve", "with a smaller valve"
 CARRYING_START = "with initial pressures that carry the load"
 FASTER_CONTROLLER = "with a faster controller"
 """Words of changes for which a run may have evidence."""
-LOAD, RATE = "motion.external_torque", "controller.rate"
+LOAD = "motion.external_torque"
 QUICKER_ABOVE = ("bandwidth", "frequency", "slew_limit")
 """Ends of the paths of numbers of which more is quicker."""
 _MOSTLY, _OFTEN = 0.5, 0.1
@@ -56,7 +57,7 @@ Evidence = tuple[tuple[str, ...], str]
 
 def ideal_words(scenario: Scenario, path: str) -> str:
     """Words of the change that makes a number ideal."""
-    if path == RATE:
+    if path == RATE_PATH:
         return FASTER_CONTROLLER
     return f"{'with a quicker' if path.endswith(QUICKER_ABOVE) else 'without'} {stated_number(scenario, path)}"
 
@@ -82,7 +83,7 @@ def evidence_in(case: Case) -> Iterator[Evidence]:
     delays = delays_of(scenario)
     if path := most_of(delays):
         total, rate = level_text("s", math.fsum(delays.values())), 1.0 / scenario.controller.period
-        stated = f"`{RATE} = {rate:.4g} Hz`" if path == RATE else stated_number(scenario, path)
+        stated = f"`{RATE_PATH} = {rate:.4g} Hz`" if path == RATE_PATH else stated_number(scenario, path)
         yield (ideal_words(scenario, path),), f"{stated} is most of the loop's delay of {total}"
 
 
@@ -97,7 +98,7 @@ def delays_of(scenario: Scenario) -> dict[str, float]:
     spool, slew = number.pop(_SPOOL, 0.0), number.pop(_SLEW, 0.0)
     damping = number.pop(_DAMPING, 0.0)
     delays = {path: lag_of_sensor(value) if path.endswith("bandwidth") else value for path, value in number.items()}
-    delays[RATE] = SAMPLES_LATE * scenario.controller.period
+    delays[RATE_PATH] = SAMPLES_LATE * scenario.controller.period
     delays[_SPOOL] = 2.0 * damping / (2.0 * math.pi * spool) if spool > 0.0 else 0.0
     delays[_SLEW] = 0.5 / slew if slew > 0.0 else 0.0
     return delays
