@@ -109,10 +109,11 @@ def sweep(
         (folder.path / SUMMARY).unlink(missing_ok=True)
     work = partial(compute_chunk, chosen, threads=threads if workers is None else threads or 1)
     computed: Iterable[tuple[int, tuple[int, bytes]]]
-    if workers is None:
-        computed = enumerate(work(chunk, count=counter.count_ended) for chunk in missing)
-    else:
-        computed = computed_by(workers, work, missing)
+    computed = (
+        enumerate(work(chunk, count=counter.count_ended) for chunk in missing)
+        if workers is None
+        else computed_by(workers, work, missing)
+    )
     for number, (failed, content) in computed:
         folder.write_chunk(missing[number].number, failed, content)
         counter.add(missing[number].runs, failed)

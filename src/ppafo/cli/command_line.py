@@ -174,9 +174,11 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
         help="your own Python module that files refer to, such as laws.py",
     )
     if OUT not in names:
-        help_text = "also write the result as files into this folder"
-        if command.default_folder:
-            help_text = "the result folder; default one in out/ named after what ran"
+        help_text = (
+            "the result folder; default one in out/ named after what ran"
+            if command.default_folder
+            else "also write the result as files into this folder"
+        )
         parser.add_argument("--out", metavar="DIR", type=Path, help=help_text)
 
 
@@ -340,7 +342,9 @@ def check_options(words: Sequence[str], parser: CommandParser) -> None:
         if not is_value and not is_known:
             # Without the dashes, which all have in common and which would make strangers look alike.
             names = [option.removeprefix("--") for option in known if option.startswith("--")]
-            hint = nearest_name(name.strip("-"), names).replace("'", "'--", 1)
-            if name == "--set" and "design" in words[:1]:
-                hint = ": write overrides = ['PATH=VALUE'] into the design file"
+            hint = (
+                ": write overrides = ['PATH=VALUE'] into the design file"
+                if name == "--set" and "design" in words[:1]
+                else nearest_name(name.strip("-"), names).replace("'", "'--", 1)
+            )
             raise UsageError(f"there is no option '{name}'{hint}; available: {', '.join(known)}")

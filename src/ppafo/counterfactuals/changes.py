@@ -335,10 +335,10 @@ def _easier_tasks(scenario: Scenario, present: Mapping[str, float]) -> Iterator[
         farthest = max(abs(present[path]) for path in paths)
         reach = _WITHIN_REACH * float(np.max(np.abs(available_torque(scenario))))
         sizes += [reach / farthest] if farthest * _SIZES[-1] > reach else []
+    amplitude = "reference.amplitude"
     for by in sizes:
-        smaller = {path: start + by * (present[path] - start) for path in paths}
-        if amplitude := present.get("reference.amplitude"):
-            smaller = {"reference.amplitude": by * amplitude}
+        levels = {path: start + by * (present[path] - start) for path in paths}
+        smaller = {amplitude: by * present[amplitude]} if present.get(amplitude) else levels
         yield Change(SMALLER_REFERENCE, "task", smaller, scenario)
     yield Change("with a longer run", "task", {_DURATION: _LONGER * duration}, scenario)
 

@@ -38,9 +38,7 @@ def in_shown_unit(number: float, unit: str, stated: str = "") -> tuple[float, st
     A pressure stated as gauge is shown absolute, as it is stored.
     """
     si_unit = "Pa_d" if unit == "Pa" else unit
-    shown = stated or shown_unit(si_unit)
-    if stated and si_unit == "Pa_d":
-        shown = f"{split_pressure_kind(stated)[0]}_d"
+    shown = f"{split_pressure_kind(stated)[0]}_d" if stated and si_unit == "Pa_d" else stated or shown_unit(si_unit)
     return shown_value(float(number), si_unit, shown), shown.removesuffix("_d")
 
 

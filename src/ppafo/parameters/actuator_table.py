@@ -218,9 +218,9 @@ def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, 
             f"{shown_text(fall, 'm^3', '.3g')}; allowed is the last digit, {shown_text(resolution, 'm^3', '.3g')}"
         )
     sign, direction = (1.0, "grow") if name == "volume_1" else (-1.0, "shrink")
-    wrong = np.flatnonzero(sign * np.diff(volume[:, -1]) <= -unseen)
-    if np.ptp(volume[:, -1]) <= unseen:
-        wrong = np.arange(1)
+    wrong = (
+        np.arange(1) if np.ptp(volume[:, -1]) <= unseen else np.flatnonzero(sign * np.diff(volume[:, -1]) <= -unseen)
+    )
     if wrong.size:
         raise ParameterError(
             f"{file}: {name} must {direction} with the angle at the highest pressure, but does not at "

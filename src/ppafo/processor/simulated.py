@@ -68,9 +68,11 @@ def try_firmware(scenario: Scenario, samples: int, seed: int = 1) -> FirmwareTri
             f"mspdebug answered {len(found)} of {samples} samples; it printed {one_line(printed[-80:])}"
         )
     differing = [number for number, decision in enumerate(found) if decision != expected[number]]
-    first = ""
-    if differing:
-        first = f"sample {differing[0]}: {found[differing[0]]} on the processor, {expected[differing[0]]} in Python"
+    first = (
+        f"sample {differing[0]}: {found[differing[0]]} on the processor, {expected[differing[0]]} in Python"
+        if differing
+        else ""
+    )
     _, flash = re.findall(r"Done, (\d+) bytes total", printed)
     # What data below and stack above have overwritten, from mspdebug's dump.
     dump = printed.rpartition(f"=> md {_RAM_START} {RAM}")[2]

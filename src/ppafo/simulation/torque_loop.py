@@ -165,9 +165,11 @@ def chambers_of(actuator: Actuator) -> PlainFunction:
     if actuator.kind == VANE:
         return vane_at
     model, name = ACTUATORS[actuator.kind].model, actuator.kind
-    shape = model.prepare
-    if actuator.table is not None:
-        shape = made_of(measured_shape_of, f"shape_of_{name}", _MeasuredParts(model.prepare, actuator.table))
+    shape = (
+        made_of(measured_shape_of, f"shape_of_{name}", _MeasuredParts(model.prepare, actuator.table))
+        if actuator.table is not None
+        else model.prepare
+    )
     return made_of(shaped_at, f"chambers_at_of_{name}", _ShapedParts(shape, model.chambers, model.torque))
 
 

@@ -236,9 +236,9 @@ def read_mapped_matlab(file: _MatlabFile, columns: ColumnMap, map_name: str) -> 
                     named[name] = _variable(f"channels.{name}.column", mapped.column, file, is_text=name == TIME)
         raise_noted(faults)
         date, clock = columns.channels[TIME].date, file.texts.get(named.get(TIME, ""))
-        dates = None
-        if date is not None:
-            dates = file.texts.get(_variable(f"channels.{TIME}.date", date, file, is_text=True))
+        dates = (
+            file.texts.get(_variable(f"channels.{TIME}.date", date, file, is_text=True)) if date is not None else None
+        )
         numbers = {name: file.columns[each] for name, each in named.items() if name != TIME or clock is None}
         lengths = {name: values.size for name, values in numbers.items()} | ({TIME: len(clock)} if clock else {})
         if len(set(lengths.values())) != 1:

@@ -94,10 +94,11 @@ def _columns_of(frame: Any) -> list[tuple[str, Any]]:
 def _named_columns(frame: Any) -> tuple[list[HeaderColumn], list[tuple[str, Any]]]:
     """Return header and columns, with units in their names, in their attributes or in those of the frame."""
     columns = _columns_of(frame)
-    if hasattr(frame, "data_vars"):
-        units = {name: str(column.attrs.get("units", "")) for name, column in columns}
-    else:
-        units = {str(name): str(unit) for name, unit in dict(frame.attrs.get("units", {})).items()}
+    units = (
+        {name: str(column.attrs.get("units", "")) for name, column in columns}
+        if hasattr(frame, "data_vars")
+        else {str(name): str(unit) for name, unit in dict(frame.attrs.get("units", {})).items()}
+    )
     heads = []
     for name, _ in columns:
         unit, head = units.get(name, ""), name

@@ -163,10 +163,11 @@ class _Writer:
             members = [(inner, f"item[{count}]")]
             taken, variable = {f"item_{index}": inner for index in range(count)}, "made"
         else:
-            if isinstance(kind, Row):
-                named = [(member_name(kind, own), inner) for own, inner in kind.fields]
-            else:
-                named = [(f"item_{index}", inner) for index, inner in enumerate(types_in(kind))]
+            named = (
+                [(member_name(kind, own), inner) for own, inner in kind.fields]
+                if isinstance(kind, Row)
+                else [(f"item_{index}", inner) for index, inner in enumerate(types_in(kind))]
+            )
             types = {own: self.type_name(inner) for own, inner in named if not is_empty(inner)}
             members = [(inner, own) for own, inner in types.items()]
             taken = {c_name(own, types, {name, *types.values()}): inner for own, inner in types.items()}

@@ -200,9 +200,11 @@ def read_unit(unit: str, is_mass_flow: bool = False) -> ParsedUnit:
             f"allowed: {', '.join(MOLAR_MASSES)}, or a molar mass in kg/mol"
         )
     mass = _molar_mass(flow.gases[0])
-    density = pressure * mass / (MOLAR_GAS_CONSTANT * temperature)
-    if is_humid and abs(mass / MOLAR_MASSES["air"] - 1.0) < _AS_AIR:
-        density = STANDARD_REFERENCE_DENSITY_AIR
+    density = (
+        STANDARD_REFERENCE_DENSITY_AIR
+        if is_humid and abs(mass / MOLAR_MASSES["air"] - 1.0) < _AS_AIR
+        else pressure * mass / (MOLAR_GAS_CONSTANT * temperature)
+    )
     scale = DECIMALS.multiply(parse_unit(flow.unit).scale, Decimal(repr(density)))
     return ParsedUnit(scale, Decimal(0), MASS_FLOW)
 

@@ -640,9 +640,11 @@ def of_numbers(request: Replay) -> Iterator[Cause]:
     device, recording = request.device, request.measured.recording
     scenario = replace(replayed_scenario(request), device=device)
     # Supply pressures that a replay follows in the recording, whatever the set has.
-    followed = {path for path, channel in _OF_SUPPLY.items() if channel in recording}
-    if SUPPLY in recording and device.supply.has_one_pressure:
-        followed = set(_OF_SUPPLY)
+    followed = (
+        set(_OF_SUPPLY)
+        if SUPPLY in recording and device.supply.has_one_pressure
+        else {path for path, channel in _OF_SUPPLY.items() if channel in recording}
+    )
     other_forms = {f"{part}.{name}" for part in ("actuator.leak", "valve") for name in other_form(device, part)}
     by_section: dict[str, list[tuple[str, Quantity]]] = {section: [] for section in _SECTIONS}
     for path, quantity in declared_numbers(scenario).items():

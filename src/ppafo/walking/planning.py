@@ -119,9 +119,11 @@ def stiff_loads(run: Run) -> tuple[Problem, ...]:
 
     def line(number: int) -> str:
         step, most = at(run.step, number), at(longest, number)
-        cause = f"stiffness of {at(stiffness, number):.3g} N m/rad"
-        if at(dragged, number) < at(sprung, number):
-            cause = f"drag of {at(damping, number):.3g} N m s/rad at {FASTEST_FOOT:g} rad/s"
+        cause = (
+            f"drag of {at(damping, number):.3g} N m s/rad at {FASTEST_FOOT:g} rad/s"
+            if at(dragged, number) < at(sprung, number)
+            else f"stiffness of {at(stiffness, number):.3g} N m/rad"
+        )
         return (
             f"{names}: a {cause} needs steps of at most {1.0e3 * most:.2g} ms, but a walk has fixed steps of "
             f"{1.0e3 * step:.3g} ms: set run.step = {0.5e3 * most:.2g} ms"

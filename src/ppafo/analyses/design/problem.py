@@ -359,9 +359,9 @@ def read_profile(table: ProfileSection, folder: Path, where: str) -> RequiredTor
         raise StudyError(f"{where}: the torque is 0 {_TORQUE} throughout; give a profile with a torque other than 0")
     # The last sample is the first of the next repetition. Where the two differ it stays, a moment earlier: the table
     # then jumps as the profile does.
-    samples = time[:-1], torque[:-1]
-    if torque[-1] != torque[0]:
-        samples = np.append(time[:-1], time[-1] - min(_MOMENT, 0.5 * (time[-1] - time[-2]))), torque
+    last = time[-1] - min(_MOMENT, 0.5 * (time[-1] - time[-2]))
+    is_open = torque[-1] != torque[0]
+    samples = (np.append(time[:-1], last), torque) if is_open else (time[:-1], torque[:-1])
     return RequiredTorque(time, torque, kind, *choose_knots(*samples))
 
 

@@ -173,9 +173,11 @@ class Sizing:
             working = [sized for sized in self.valves if sized.works]
             near = min(self.valves, key=lambda sized: np.nan_to_num(sized.error, nan=np.inf))
             nearest = f"{TORQUE.text(near.error)} with {near.name} at {PRESSURE.text(near.pressure)}"
-            reasons = [f"no valve keeps the error limit; the smallest error is {nearest}"]
-            if working:
-                reasons = ["valves keep the error limit, but no bottle lasts for the requested use"]
+            reasons = (
+                ["valves keep the error limit, but no bottle lasts for the requested use"]
+                if working
+                else [f"no valve keeps the error limit; the smallest error is {nearest}"]
+            )
             reasons += [f"{each.name}{cut}" for each in working or self.valves if (cut := self._cut_peak(each))]
             return f"no suggestion: {'; '.join(reasons)}"
         bottle = "" if choice.bottle is None else f" and {choice.bottle.name}"

@@ -71,10 +71,11 @@ class _Instance:
     def begin(self, numbers: Any, values: Any) -> int:
         """Set the inputs and initialise up to the first sample."""
         experiment = (c_int(0), c_double(0.0), c_double(0.0), c_int(0), c_double(0.0))
-        if self.fmi == 2:
-            begun = self.call("SetupExperiment", *experiment) or self.call("EnterInitializationMode")
-        else:
-            begun = self.call("EnterInitializationMode", *experiment)
+        begun = (
+            self.call("SetupExperiment", *experiment) or self.call("EnterInitializationMode")
+            if self.fmi == 2
+            else self.call("EnterInitializationMode", *experiment)
+        )
         return begun or self.exchange("Set", numbers, values) or self.call("ExitInitializationMode")
 
     def advance(self, time: float, length: float) -> int:

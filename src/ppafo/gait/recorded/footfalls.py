@@ -185,9 +185,11 @@ def wrap_cycle(walk: Mapping[str, Signal]) -> tuple[dict[str, Signal], float, fl
         inside = instants <= start + max(overlap, 0.0)
         distance = float(np.mean((later - values)[inside])) if signal.is_position else 0.0
         weight = np.clip((instants - start) / overlap, 0.0, 1.0) if overlap > 0.0 else np.ones(count)
-        blend = weight * values + (1.0 - weight) * (later - distance)
-        if name in LOADS:
-            blend = np.where(np.abs(later) > np.abs(values), later, values)
+        blend = (
+            np.where(np.abs(later) > np.abs(values), later, values)
+            if name in LOADS
+            else weight * values + (1.0 - weight) * (later - distance)
+        )
         again = (turns[:, None] * period + instants[None, :]).ravel()
         repeated = (turns[:, None] * distance + np.where(inside, blend, values)[None, :]).ravel()
         wrapped[name] = replace(signal, time=again, values=repeated, columns=(), absent=None)

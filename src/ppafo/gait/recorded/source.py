@@ -194,10 +194,12 @@ def foot_markers_angle(columns: CurveColumns, mapped: AngleMap, shank: Signal) -
     lost = np.zeros(time.size, dtype=np.bool_) if recorded.lost is None else recorded.lost[inside]
     if shank.lost is not None:
         lost = lost | (np.interp(time, shank.time, shank.lost.astype(np.float64)) > 0.0)
-    flat = np.zeros(time.size, dtype=np.bool_)
-    if time.size >= 3:
-        # Flat: the foot hardly turns while the shank leans over it. The median of these samples is the zero.
-        flat = (np.abs(np.gradient(values, time)) < _SLOW) & (np.gradient(lean, time) < 0.0) & ~lost
+    # Flat: the foot hardly turns while the shank leans over it. The median of these samples is the zero.
+    flat = (
+        (np.abs(np.gradient(values, time)) < _SLOW) & (np.gradient(lean, time) < 0.0) & ~lost
+        if time.size >= 3
+        else np.zeros(time.size, dtype=np.bool_)
+    )
     # Less than a tenth of a second of flat foot may be a pause of the swing.
     if np.count_nonzero(flat) < _LEAST_FLAT * recorded.rate:
         raise DataError(

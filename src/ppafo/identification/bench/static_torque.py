@@ -85,9 +85,11 @@ class StaticTorqueProblem(bench.BenchLaw):
         clusters = np.unique(pairs, axis=1, return_inverse=True)[1].reshape(-1)
         repetitions = clusters.max() + 1
         # Each group is one more test: of very many none would be significant.
-        labels = bench.recordings_of(sources)[is_used]
-        if repetitions <= _MOST_REPETITIONS:
-            labels = np.array([f"repetition {number + 1}" for number in clusters.tolist()])
+        labels = (
+            np.array([f"repetition {number + 1}" for number in clusters.tolist()])
+            if repetitions <= _MOST_REPETITIONS
+            else bench.recordings_of(sources)[is_used]
+        )
         # Friction varies with position within a stroke, so that consecutive samples of a branch and a repetition at one
         # pressure are no independent readings of the law.
         widest = np.ptp(pressure) / _BINS / 2.0
