@@ -114,7 +114,7 @@ def test_a_discharge_coefficient_above_one_is_doubted(bench: Path, solved: Solve
     assert result.estimates[0].verdict == "holds for this model only"
 
 
-def test_readings_before_the_air_is_on_are_left_out_and_no_swapped_columns(bench: Path, solved: Solve) -> None:
+def test_readings_before_the_air_is_on_show_the_zeros_and_no_swapped_columns(bench: Path, solved: Solve) -> None:
     one, right = planted.flow().recording, solved(FLOW).results[0].estimates[0].value
     channels = {}
     for name in ("upstream_pressure", "downstream_pressure", "mass_flow"):
@@ -122,8 +122,8 @@ def test_readings_before_the_air_is_on_are_left_out_and_no_swapped_columns(bench
         channels[name] = Channel(np.concatenate([np.full(40, before), one[name]]), one.unit(name))
     write_csv(bench / "rest.csv", Recording("rest", np.arange(100.0), channels, "synthetic"))
     result = solved(FLOW.replace("flow.csv", "rest.csv")).results[0]
-    assert result.remarks[0] == "left out: 40 of 100 readings without flow and pressure difference"
-    assert result.estimates[0].value == pytest.approx(right, rel=1e-9)
+    assert result.remarks[0].startswith("40 of 100 readings are without flow")
+    assert result.estimates[0].value == pytest.approx(right, rel=5e-3)
 
 
 def test_procedures_run_in_the_recommended_order_whatever_the_order_of_the_file(solved: Solve) -> None:

@@ -47,6 +47,12 @@ _MINIMUM_SAMPLES = 5
 _FULLY_OPEN = 0.99
 _FEW = 10
 """Reciprocal of the largest fraction of readings without flow or with crossed pressures that counts as noise."""
+_FLOW_AT_REST, _APART_AT_REST, _FINEST = 5.0e-3, 0.1, 1.0e-5
+"""Largest flow about the zero and pressure difference of readings at rest, and finest zero [-].
+
+All are fractions of the largest readings: at a tenth of the pressure difference any law has a tenth of the flow.
+"""
+_FEWEST_AT_REST = 2
 _NEARLY_EQUAL = 0.9
 _REGIMES = "choked flow", "subsonic flow", "flow at nearly equal pressures"
 LARGEST_COEFFICIENT = 1.0
@@ -83,6 +89,7 @@ GAP = "effects.laminar_leak.coefficient"
 """Path of the coefficient of a laminar gap beside the orifice in a set."""
 TEMPERATURE, GAS_LAW, METER, SENSORS = "gas temperature", "gas law", "gain of the flow meter", "gain of the pressures"
 ZERO = "zero of the flow meter"
+_COMMON_ZERO = "zero of both pressures"
 _APPARENT = "laminar gap equivalent to a gain error of the flow meter"
 """Names of the tolerances of a flow bench."""
 
@@ -172,16 +179,59 @@ def gas_tolerances(gas: GasAt, tolerances: Tolerances) -> tuple[FitNumber, ...]:
     return (*tolerance(TEMPERATURE, gas.temperature_deviation), *bench.within(departure, GAS_LAW))
 
 
+def readings_in_flow(
+    sources: Sources, names: tuple[str, str], used: Flags, tolerances: Tolerances, fewest: int
+) -> tuple[Flags, tuple[FitNumber, ...], tuple[str, ...]]:
+    """Return flags of the ``used`` readings that are not at rest, and the zeros that those at rest show, with a remark.
+
+    At rest both pressures [Pa] are equal to their noise, which crosses some of them, while the meter shows hardly any
+    flow [kg/s]. Then the meter reads its zero, and the pressures by how much their zeros differ. A
+    single one shows nothing, and at least ``fewest`` others must be left.
+    """
+    first, second, flow = (pool(sources, name) for name in (*names, "mass_flow"))
+    difference, size = first - second, np.abs(flow)
+    widest, largest = (float(np.abs(each[used]).max(initial=0.0)) for each in (difference, flow))
+    is_small = used & (size <= max(_FLOW_AT_REST, tolerances.zero_of_flow) * largest)
+    is_small &= np.abs(difference) <= _APART_AT_REST * widest
+    is_crossed = is_small & (difference * np.sign(difference[used] @ flow[used]) <= 0.0)
+    # Of a small flow noise may cross the pressures too, but at rest the meter shows one reading.
+    shown = float(np.quantile(flow[is_crossed], 0.25)) if is_crossed.any() else 0.0
+    is_at_rest = is_small & (np.abs(flow - shown) <= _FLOW_AT_REST * largest)
+    count, total = np.count_nonzero(is_at_rest), np.count_nonzero(used)
+    if count < _FEWEST_AT_REST or total - count < fewest:
+        return used, (), ()
+    zeros = list[FitNumber]()
+    for path, values, span in ((ZERO, flow, largest), (f"zero of {names[0]}", difference, widest)):
+        deviation, mean = float(np.std(values[is_at_rest])), float(np.mean(values[is_at_rest]))
+        # A zero may drift from reading to reading, so that more of them tell no more.
+        zeros += tolerance(path, max(deviation, _FINEST * span), mean)
+    zeros += bench.within(tolerances.zero_of_pressure, _COMMON_ZERO)
+    remark = f"{count} of {total} readings are without flow and show the zeros of flow meter and pressures"
+    return used & ~is_at_rest, tuple(zeros), (remark,)
+
+
 def flow_tolerances(
-    gas: GasAt, tolerances: Tolerances, pressures: Mapping[str, Floats], flow: Floats
+    gas: GasAt,
+    tolerances: Tolerances,
+    pressures: Mapping[str, Floats],
+    flow: Floats,
+    zeros: tuple[FitNumber, ...] = (),
 ) -> tuple[FitNumber, ...]:
-    """Return the uncertain quantities of a flow bench: gas, gains and zeros of the sensors of pressures and flow."""
+    """Return the uncertain quantities of a flow bench: gas, gains and zeros of the sensors of pressures and flow.
+
+    ``zeros`` that readings at rest have shown take the place of those of any bench.
+    """
     return (
         *gas_tolerances(gas, tolerances),
         *bench.within(tolerances.gain_of("mass_flow"), METER),
         *bench.within(tolerances.gain_of("pressure"), SENSORS),
-        *bench.within(tolerances.zero_of_flow * np.abs(flow).max(), ZERO),
-        *bench.within(tolerances.zero_of_pressure, *(f"zero of {name}" for name in pressures)),
+        *(
+            zeros
+            or (
+                *bench.within(tolerances.zero_of_flow * float(np.abs(flow).max()), ZERO),
+                *bench.within(tolerances.zero_of_pressure, *(f"zero of {name}" for name in pressures)),
+            )
+        ),
     )
 
 
@@ -193,7 +243,7 @@ def shown_flow(
     ``flow`` is the flow at the nominal gas state [kg/s] by true pressures [Pa]; a gain error acts on gauge pressures.
     """
     first, second = (
-        np.asarray(shown - at[f"zero of {name}"] - at[SENSORS] * (shown - STANDARD_ATMOSPHERE))
+        np.asarray(shown - at[f"zero of {name}"] - at[_COMMON_ZERO] - at[SENSORS] * (shown - STANDARD_ATMOSPHERE))
         for name, shown in pressures.items()
     )
     # Flow through an opening goes with one over the root of the temperature.
@@ -360,6 +410,7 @@ def solve_flow(
     tolerances: Tolerances,
     confidence: float,
     ratios: Sequence[float] = CRITICAL_RATIOS[:1],
+    zeros: tuple[FitNumber, ...] = (),
 ) -> tuple[Fit, Floats]:
     """Fit an opening to a measured ``flow`` with ``groups``. Returns the fit and the fitted flow [kg/s].
 
@@ -375,7 +426,7 @@ def solve_flow(
     starts = (nnls(columns * alone, flow)[0] * alone).tolist()
     numbers = (
         *opening.unknowns(starts, alone.tolist(), ratio),
-        *flow_tolerances(opening.gas, tolerances, pressures, flow),
+        *flow_tolerances(opening.gas, tolerances, pressures, flow, zeros),
         # A gain that differs between small and large flows bends the curve of one opening as a gap beside it does.
         *(bench.within(tolerances.gain_of("mass_flow") * alone[1], _APPARENT) if opening.law == "both" else ()),
     )
@@ -414,15 +465,12 @@ class OpenValveFlowProblem(FlowLaw):
         fully_open = "readings with the valve fully open (command 1 or -1)"
         readings.check_enough(sources[0], is_open.sum(), _MINIMUM_SAMPLES, fully_open)
         upstream, downstream, flow = (pool(sources, name) for name in self.needed)
-        is_crossed, remarks = downstream >= upstream, tuple[str, ...]()
-        # A log may begin before the gas supply is on: no flow without pressure difference is then no error of a column.
-        is_at_rest = is_open & is_crossed & (np.abs(flow) <= zero * np.abs(flow[is_open]).max())
-        if is_at_rest.sum() > is_open.sum() // _FEW and (is_open & ~is_at_rest).sum() >= _MINIMUM_SAMPLES:
-            remarks = (
-                f"left out: {is_at_rest.sum()} of {is_open.sum()} readings without flow and pressure difference",
-            )
-            is_open = is_open & ~is_at_rest
-        crossed = np.count_nonzero(is_crossed[is_open])
+        # A log may begin before the gas supply is on: what is at rest then is no error of a column.
+        is_open, zeros, remarks = readings_in_flow(
+            sources, _VALVE_PRESSURES, is_open, context.tolerances, _MINIMUM_SAMPLES
+        )
+        apart = {zero.path: zero.start for zero in zeros}.get(f"zero of {_VALVE_PRESSURES[0]}", 0.0)
+        crossed = np.count_nonzero((downstream + apart >= upstream)[is_open])
         # Noise may exchange a few pressures that are nearly equal.
         if crossed > is_open.sum() // _FEW:
             sources[0].refuse(
@@ -443,7 +491,7 @@ class OpenValveFlowProblem(FlowLaw):
         # The nearer the pressures are to each other, the more their noise affects the computed flow.
         limits = critical_pressure_ratio(gas.heat_capacity_ratio), _NEARLY_EQUAL
         groups = recorded, np.array(_REGIMES)[np.digitize(ratio, limits)]
-        fitted, model = solve_flow(opening, pressures, flow, groups, context.tolerances, self.confidence)
+        fitted, model = solve_flow(opening, pressures, flow, groups, context.tolerances, self.confidence, zeros=zeros)
         scatter = float(np.std(flow - model) / flow.max())
         # Densely, so that the curve has no kinks at the readings; between them the upstream pressure is interpolated.
         dense, order = np.linspace(ratio.min(), ratio.max(), 200), np.argsort(ratio)

@@ -184,8 +184,11 @@ class SteadyLeakProblem(LeakLaw):
         for source in sources:
             readings.check_not_clipped(source, "mass_flow", "pressure_1", source.recording["pressure_1"])
         is_used = np.ones(sum(len(source.recording) for source in sources), dtype=bool)
-        zero = context.tolerances.zero_of_flow
-        pressures, metered, recorded, remarks = flow.steady_readings(sources, _CHAMBERS, zero, is_used)
+        tolerances = context.tolerances
+        is_used, zeros, at_rest = flow.readings_in_flow(sources, _CHAMBERS, is_used, tolerances, _FEWEST_STEADY)
+        pressures, metered, recorded, remarks = flow.steady_readings(
+            sources, _CHAMBERS, tolerances.zero_of_flow, is_used
+        )
         first, second = pressures.values()
         # A wrong law gives different sizes at low and at high pressures.
         difference, ratio = first - second, np.minimum(first, second) / np.maximum(first, second)
@@ -193,7 +196,7 @@ class SteadyLeakProblem(LeakLaw):
         groups = recorded, "mass_flow", np.where(is_high, "flow at higher pressures", "flow at lower pressures")
         has_both = flow.has_both_regimes(openings[0], ratio, sources[0])
         fits = [
-            flow.solve_flow(opening, pressures, metered, groups, context.tolerances, self.confidence, _TRIAL_RATIOS)
+            flow.solve_flow(opening, pressures, metered, groups, tolerances, self.confidence, _TRIAL_RATIOS, zeros)
             for opening in openings
         ]
         model = fits[0][1]
@@ -202,7 +205,7 @@ class SteadyLeakProblem(LeakLaw):
         axes = Kind("Pressure difference", "Pa_d", "pressure change"), Kind("Flow", "kg/s", "mass flow")
         panels = with_residuals("Steady leak", *axes, [series], [curve_mark(curve, difference, model)])
         summary = f"{metered.size} steady readings; scatter {scatter:.2%} of the largest flow"
-        return [fit for fit, _ in fits], has_both, summary, panels, remarks, scatter
+        return [fit for fit, _ in fits], has_both, summary, panels, (*at_rest, *remarks), scatter
 
 
 class ChamberDecay(NamedTuple):

@@ -88,3 +88,19 @@ def test_a_leak_into_an_evacuated_chamber_is_identified_on_either_side(exchanged
     assert 0.113 * result.estimates[0].value == pytest.approx(1.0e-8, rel=0.02)
     assert result.estimates[0].is_identified
     assert any("is treated as a reservoir" in remark for remark in result.remarks)
+
+
+@pytest.mark.parametrize(("meter", "apart"), [(0.0, 0.0), (2.0e-6, 4.0), (-2.0e-6, -3.0)])
+def test_readings_at_rest_show_the_zeros_of_a_meter_whose_discharge_rises_with_flow(
+    meter: float, apart: float, tmp_path: Path
+) -> None:
+    columns = "time [s],upstream_pressure [Pa_g],downstream_pressure [Pa_g],mass_flow [kg/s]"
+    random, rest = np.random.default_rng(5), [(0.0, 0.0)] * 11
+    flows = np.geomspace(1.0e-4, 2.2e-3, 30)
+    sizes = 66.0e-6 + 8.0e-6 * (1.0 - np.exp(-flows / 6.0e-4))
+    driven = [*rest, *zip(flows**2 / (2.0 * 1.204 * sizes**2), flows, strict=True)]
+    rows = [(step + apart + random.normal(0.0, 0.5), 0.0, flow + meter) for step, flow in driven]
+    (result,) = identified(tmp_path, columns, rows, "open-valve-flow").results
+    # No reading has more than the largest size.
+    assert 31.6e-6 * result.estimates[0].value < 74.2e-6
+    assert any("11 of 41 readings are without flow" in remark for remark in result.remarks)
