@@ -332,7 +332,8 @@ def _drawn_runs(
     if not uncertainty.drawn:
         return {}
     count, seed, maximum_failed = draws
-    columns, drawn = uncertainty.replicated_columns(count, seed), dict[tuple[str, str], ask.Rows]()
+    columns = uncertainty.replicated_columns(count, seed)
+    drawn = {}
     counter = ask.RunCounter(max(map(len, columns.values())) * len(scenarios), progress)
     for (task, name), scenario in scenarios.items():
         runs = ask.scenario_runs(scenario, metrics, counter, uncertainty.gauge, threads)
@@ -347,11 +348,14 @@ def _drawn_runs(
 
 def _cases(found: ComparisonResult, runs: Mapping[str, tuple[ask.Result, ask.Rows | None]]) -> list[ComparedCase]:
     """Return the cases of a task, from the nominal run and the drawn runs of each configuration."""
-    cases, draws, base = list[ComparedCase](), found.draws, runs[found.baseline][1]
+    cases = []
+    draws = found.draws
+    base = runs[found.baseline][1]
     for name, (nominal, rows) in runs.items():
         with said_of_configuration(name):
             tracking = ask.verdict_of(nominal)
-        is_completed, pairs = nominal.status.is_completed, dict[str, PairedMetric]()
+        is_completed = nominal.status.is_completed
+        pairs = {}
         word = str(nominal.status.kind)
         if tracking.fails and is_completed:
             word = "beyond reach on purpose" if tracking.accepted else tracking.kind
@@ -544,7 +548,8 @@ def _tables(found: ComparisonResult, task: str) -> list[ask.Section]:
     # A column without any number, such as the error of a hold that no task has, says nothing.
     held = (name for name in found.metrics if not all(math.isnan(case.value(name)) for case in cases))
     kinds = {name: ask.of_metric(name) for name in held}
-    ranked, best = [case for case in cases if case.is_ranked], list[str]()
+    ranked = [case for case in cases if case.is_ranked]
+    best = []
     for metric in (name for name in kinds if name in (found.error, _GAS)):
         shares = [
             f"{case.configuration} {ask.Kind(form='.4g').interval(case.best[metric])}"
@@ -645,7 +650,8 @@ def _change_panels(found: ComparisonResult) -> list[ask.Panel]:
     panels = []
     for (task, cases), metric in product(found.tasks.items(), (found.error, _GAS)):
         colours, base = _colours(cases), next(case for case in cases if case.configuration == found.baseline)
-        marks, ends = list[ask.Mark](), list[float]()
+        marks = []
+        ends = list[float]()
         for case in cases:
             change = _relative(base.rows[metric], case.rows[metric]) if case is not base else np.zeros(0)
             if change.size == 0:

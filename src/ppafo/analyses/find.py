@@ -134,7 +134,9 @@ def find(
             return judged(runs.run(columns), limit, streams)
 
         rows, index, outer = outermost(tried, low, high, grid, highest)
-        values, is_met, remarks = rows["value"], rows["is_met"], list[str]()
+        values = rows["value"]
+        is_met = rows["is_met"]
+        remarks = []
         if not np.isfinite(rows["judged"]).any():
             ends, why = f"from {path.quote(low)} to {path.quote(high)}", runs.reason and f"the first: {runs.reason}"
             fault = f"no run {ends} gives the metric '{limit.metric}'"

@@ -245,7 +245,7 @@ def _compared(
         for one, two in product(results[first].estimates, results[second].estimates)
         if one.path == two.path in declared and one.is_usable and two.is_usable
     ]
-    sentences = list[str]()
+    sentences = []
     for first, second, one, two in pairs:
         errors = []
         for each in (one, two):
@@ -397,7 +397,9 @@ def finding_of(identification: Identification) -> Finding[Identification]:
     from ppafo.parameters.loading import parameter_set_toml
 
     name, new_set, before = identification.name, identification.new_set, identification.before
-    parts, figures, counts = list[ask.Section](), list[ask.Section](), dict[str, int]()
+    parts = []
+    figures = []
+    counts = dict[str, int]()
     for result in identification.results:
         parts.append(_part(result, before))
         number = counts[result.procedure] = counts.get(result.procedure, 0) + 1
@@ -457,7 +459,8 @@ def _part(
     from ppafo.identification.new_set import in_set_unit
     from ppafo.parameters.parameter_set import entry_text, number_in_si
 
-    rows, far = list[tuple[str, ...]](), list[str]()
+    rows = []
+    far = []
     said = [f"holds for this model only: {part.conflict}"] if part.conflict else []
     for item in part.estimates:
         # Of a conflict the explanation of each number is the one sentence that stands above.
@@ -502,7 +505,8 @@ def trajectory_panels(measurement: Recording, model: Recording) -> list[ask.Pane
     from ppafo.validation.settings import COMPARED
 
     origins = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
-    panels, looks = list[ask.Panel](), {"pressure_1": CHAMBER_1, "pressure_2": CHAMBER_2}
+    panels = list[ask.Panel]()
+    looks = {"pressure_1": CHAMBER_1, "pressure_2": CHAMBER_2}
     for name, channel in ((name, channel) for name, channel in COMPARED.items() if name in measurement):
         curve = FittedCurve(
             time=ask.TIME,

@@ -424,11 +424,12 @@ def analyse(
     if len(constant) == len(metrics):
         said = ", ".join(f"'{name}' is {number:g}" for name, number in constant.items())
         raise StudyError(f"sensitivity: {said} in every run, so no value influences it; choose another metric")
-    found = list[MetricSensitivity]()
+    found = []
     for name in (name for name in metrics if name not in constant):
         table = rows[name].reshape(samples, -1)
         # The formulas need whole blocks: one run without a value takes its block with it.
-        known, settling = np.isfinite(table), list[Indices]()
+        known = np.isfinite(table)
+        settling = []
         whole = np.flatnonzero(known.all(axis=1))
         # All blocks, and halves, and halves of halves, as far as they say something: many of the first may be left out,
         # and a metric that counts may be the same in all.
@@ -523,7 +524,9 @@ def _part(found: Influences, metric: MetricSensitivity) -> ask.Section:
     surely below a hundredth of the largest index are left out as negligible. A difference of the sum from 1 within its
     error is not attributed to interactions.
     """
-    kind, indices, remarks = ask.of_metric(metric.metric, "+.3g"), metric.indices, list[str]()
+    kind = ask.of_metric(metric.metric, "+.3g")
+    indices = metric.indices
+    remarks = []
     ranking, reach = (next(iter(each.values())) for each in (indices.values, indices.bands))
     order = np.argsort(-ranking).tolist()
     columns = [ask.Column("value", [found.paths[row] for row in order])]
@@ -574,9 +577,11 @@ def _panels(found: Influences) -> list[ask.Panel]:
         axes.set_xticks(ticks, [str(size) for size in ticks])
         axes.minorticks_off()
 
-    panels = list[ask.Panel]()
+    panels = []
     for metric in found.metrics:
-        indices, bars, courses = metric.indices, list[ask.Mark](), list[ask.Mark]()
+        indices = metric.indices
+        bars = []
+        courses = []
         name, sizes = next(iter(indices.values)), [step.blocks for step in metric.settling]
         order = np.argsort(-indices.values[name])
         colours = [ask.COLOURS[rank] if rank < _MAXIMUM_LINES else ask.GREY for rank in range(order.size)]

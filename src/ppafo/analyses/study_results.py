@@ -223,7 +223,8 @@ def summarise(study: Study, results: StudyResults) -> StudyResults:
 
     The summary has numbers of runs, first failed runs, and statistics of each metric.
     """
-    names, failures = results.configurations, list[dict[str, Any]]()
+    names = results.configurations
+    failures = list[dict[str, Any]]()
     completed, known = dict.fromkeys(names, 0), results.known
     for name in names:
         for part in results.chunks(["run", "configuration", "status", "reason"], name):
@@ -292,7 +293,8 @@ def describe(values: ask.Floats, fractions: Sequence[float]) -> dict[str, Any]:
 
 def _bands_file(study: Study, results: StudyResults) -> bytes:
     """Return the content of ``bands.parquet``: exact quantiles over the runs at each time."""
-    outputs, parts = study.outputs, list[ask.Rows]()
+    outputs = study.outputs
+    parts = []
     # Samples are read in blocks of at most so many of all runs, which fit into the memory.
     at_once = max(1, 16_000_000 // study.runs_of_configuration)
     for number, configuration in enumerate(study.configurations):
@@ -474,7 +476,8 @@ def _panels(
     results: StudyResults, metrics: Sequence[str], names: Sequence[str], varied: Sequence[str], grid: Sequence[str]
 ) -> list[ask.Panel]:
     """Return a panel for each metric and each band; over two paths, a panel of a metric for each configuration."""
-    kinds, panels = _kinds(results), list[ask.Panel]()
+    kinds = _kinds(results)
+    panels = []
     for metric in metrics:
         kind, values = kinds[metric], results.by_configuration(metric)
         if len(grid) == 2:
@@ -511,7 +514,9 @@ def _histogram(by_name: ask.Rows, kind: ask.Kind) -> ask.Panel:
     values = np.concatenate(list(known.values()))
     if not values.size:
         return ask.Panel(kind, ask.Kind(), (), then=methodcaller("set", yticks=[]))
-    low, high, ticks = float(values.min()), float(values.max()), dict[str, ask.Floats]()
+    low = float(values.min())
+    high = float(values.max())
+    ticks = {}
     if high == low:
         # One bar about the only value.
         edges, ticks = low + (abs(low) or 1.0) * np.array([-0.05, 0.05]), {"xticks": kind.values(np.array([low]))}
@@ -550,7 +555,9 @@ def _map(
     count, total = (np.bincount(cell[known], weights, minlength=cells) for weights in (None, values[known]))
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(rows.size, columns.size)
     declared = {number["path"]: number for number in results.document["study"]["vary"]}
-    axis_kinds, places, settings = list[ask.Kind](), list[ask.Floats](), dict[str, Any]()
+    axis_kinds = []
+    places = []
+    settings = dict[str, Any]()
     for side, path, levels in zip("xy", grid, (columns, rows), strict=True):
         axis_kinds.append(kinds[path])
         places.append(levels)

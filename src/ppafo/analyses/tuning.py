@@ -339,7 +339,7 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
         if (repeated := first_twice(paths)) is not None:
             raise StudyError(f"'{repeated}' appears in two [[search]] tables; omit one")
         atmosphere = ask.atmosphere_of(scenario, (*uncertainty.paths, *uncertainty.same, *paths))
-        scales = dict[str, float]()
+        scales = {}
         for goal in parsed.objective:
             if goal.weight == 0.0:
                 raise StudyError(f"objective '{goal.metric}': weight = 0 has no effect; omit this objective")
@@ -348,7 +348,7 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
                 scales[goal.metric] = ask.difference_of(goal.scale, goal.metric, where)
                 if scales[goal.metric] <= 0.0:
                     raise StudyError(f"{where}: must be above 0")
-        limits = list[ask.MetricLimit]()
+        limits = []
         for constraint in parsed.constraints:
             metric, where = constraint.metric, f"constraint '{constraint.metric}'"
             bounds = [text for text in (constraint.at_most, constraint.at_least) if text is not None]
@@ -541,7 +541,9 @@ def search(
     """
     from scipy.optimize import differential_evolution, minimize
 
-    starts, batches, box = list[SearchStart](), list[ask.Floats](), [(0.0, 1.0)] * len(before)
+    starts = []
+    batches = []
+    box = [(0.0, 1.0)] * len(before)
 
     def batch_costs(columns: ask.Floats) -> ask.Floats:
         # SciPy has a candidate in each column, the costs one in each row.
@@ -778,7 +780,9 @@ def _task_panels(tuned: Tuned) -> list[ask.Panel]:
 
 def _search_panels(tuned: Tuned) -> list[ask.Panel]:
     """Return panels of the best cost of each start over its generations, and of the gains between their bounds."""
-    searched, starts, courses = tuned.problem.searched, tuned.starts, list[ask.Mark]()
+    searched = tuned.problem.searched
+    starts = tuned.starts
+    courses = []
     for number, start in enumerate(starts):
         costs = np.array(start.generations)
         costs[costs >= INFEASIBLE] = np.nan  # no candidate keeps the constraints yet

@@ -172,13 +172,14 @@ def changes_of(scenario: Scenario) -> list[Change]:
     of_task = list(_easier_tasks(scenario, present))
     if (custom := scenario.controller.custom) is None:
         return [*_settings(scenario), *_other_kinds(scenario), *of_device, *of_task]
-    commands = list[Change]()
+    commands = []
     for factor in _COMMANDS:
         words = f"with {factor:g} times the command" if factor > 0.0 else "with the sign of the command reversed"
         base = scenario.controlled_by(ScaledCommand(custom, factor))
         commands.append(Change(words, "law", {}, base, is_of_command=True))
     # Its runs are slow: of each property the largest step that does not take many times as long.
-    longest, largest = _LONGEST_OF_OBJECT * present[_DURATION], dict[str, Change]()
+    longest = _LONGEST_OF_OBJECT * present[_DURATION]
+    largest = {}
     for change in (*of_device, *of_task):
         if change.numbers.get(_DURATION, 0.0) <= longest:
             largest[change.words] = change
@@ -195,7 +196,9 @@ def changes_of(scenario: Scenario) -> list[Change]:
 
 def _ideals(scenario: Scenario, present: Mapping[str, float]) -> Iterator[Change]:
     """Yield a change for each number that a device, a sensor or a load would rather not have."""
-    declared, second, of_sensors = declared_numbers(scenario), set(_TOGETHER.values()), dict[str, list[Change]]()
+    declared = declared_numbers(scenario)
+    second = set(_TOGETHER.values())
+    of_sensors = dict[str, list[Change]]()
     is_locked = scenario.motion.locked_angle is not None
     for path, number in present.items():
         section, item = path.partition(".")[0], declared[path]
@@ -359,7 +362,8 @@ def _settings(scenario: Scenario) -> Iterator[Change]:
     law = scenario.law
     if law is None:
         return
-    settings, computed = scenario.controller.settings, dict[str, float]()
+    settings = scenario.controller.settings
+    computed = dict[str, float]()
     for path, (link,) in default_links(scenario, law_settings(law, scenario.controlled)).items():
         # A default may follow one of these before it.
         computed[path] = float(link.number(lambda at: computed[at] if at in computed else number_at(scenario, at)))

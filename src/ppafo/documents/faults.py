@@ -42,7 +42,8 @@ def line_of(text: str, path: str) -> str:
 @lru_cache(maxsize=4)
 def _lines_in(text: str) -> dict[str, int]:
     """Return the number of the line of each path in the text of a file; of a list of tables each has its number."""
-    lines, table = dict[str, int](), ""
+    lines = dict[str, int]()
+    table = ""
     for number, line in enumerate(_LONG_TEXT.sub(lambda found: "\n" * found[0].count("\n"), text).split("\n"), 1):
         if (found := KEY_LINE.match(line)) is None:
             continue

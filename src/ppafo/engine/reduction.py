@@ -268,7 +268,8 @@ class Reduction:
 
     def of_boolop(self, node: ast.BoolOp) -> ast.expr:
         """Return ``and`` or ``or`` with known operands evaluated."""
-        deciding, unknown = isinstance(node.op, ast.Or), list[ast.expr]()
+        deciding = isinstance(node.op, ast.Or)
+        unknown = []
         for operand in map(self.condition, node.values):
             if not isinstance(operand, ast.Constant):
                 unknown.append(operand)

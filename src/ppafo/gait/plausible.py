@@ -265,7 +265,9 @@ def standing_turns(shank: Floats, ankle: Floats) -> tuple[float, float]:
 
 def stride_remarks(curves: Mapping[str, Floats]) -> list[str]:
     """Return remarks on the curves of a stride, both ends included: unusual force, unclear signs, zero of the ankle."""
-    remarks, shank, ankle = list[str](), curves["shank_angle"], curves["ankle_angle"]
+    remarks = []
+    shank = curves["shank_angle"]
+    ankle = curves["ankle_angle"]
     if "vertical_force" in curves:
         # Both ends are one phase, which must not count twice.
         mean, (low, high) = float(np.mean(curves["vertical_force"][:-1])), USUAL_FORCE_MEAN

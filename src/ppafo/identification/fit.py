@@ -514,14 +514,16 @@ def _conflict_of(runs: FitRuns, rows: Floats, point: Floats, free: Flags, freedo
         (block.channel, block.recording, f"{block.channel} of {block.recording}", *block.groups)
         for block in runs.blocks
     ]
-    groups, known = list[tuple[str, list[slice]]](), [[block.rows for block in runs.blocks]]
+    groups = []
+    known = [[block.rows for block in runs.blocks]]
     for column in zip(*labels, strict=True):
         for name in dict.fromkeys(column):
             parts = [block.rows for block, label in zip(runs.blocks, column, strict=True) if label == name]
             if parts not in known:
                 known.append(parts)
                 groups.append((name, parts))
-    count_of_tests, found = len(groups) + (prior > 0.0).sum(), list[Conflict]()
+    count_of_tests = len(groups) + (prior > 0.0).sum()
+    found = []
     for name, parts in groups:
         group = np.concatenate([slopes[part] for part in parts])
         pull = group.T @ np.concatenate([errors[part] for part in parts]) + prior * shift
@@ -550,7 +552,7 @@ def _conflict_of(runs: FitRuns, rows: Floats, point: Floats, free: Flags, freedo
         p = min(2.0 * student.sf(ratio, freedom) * count_of_tests, 1.0)
         found.append(_beyond_limit(numbers[index].name, ratio, p))
     # Tolerances of a family are tested together, in directions that the unknowns of the fit do not absorb.
-    families = list[Conflict]()
+    families = []
     for family in dict.fromkeys(number.family for number in numbers if number.family):
         members = [index for index, number in enumerate(numbers) if number.family == family and prior[index] > 0.0]
         weight = np.sqrt(prior[members])
@@ -680,7 +682,7 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
         errors_in_noise = 1.0 / noise.innovation
         words = f"the residual of {smoothest} is {errors_in_noise:.0f} times its noise and too smooth to be noise"
         conflict = Conflict(smoothest, "", errors_in_noise, 0.0, words)
-    edge = dict[str, int]()
+    edge = {}
     if not math.isfinite(gain):
         # Unknowns of which a short step alone makes every run fail; all, where only their combination does.
         sought = np.flatnonzero((runs.prior == 0.0) & (step != 0.0))
@@ -705,7 +707,7 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
     is_positive |= runs.base @ is_positive > 0.0
     typical = np.where(runs.prior > 0.0, 1.0, np.where(is_positive, estimated, np.maximum(estimated, 1.0)))
     names = [number.name for number in runs.numbers]
-    unidentified = list[dict[str, float]]()
+    unidentified = []
     variances, vectors = np.linalg.eigh(covariance / np.outer(typical, typical))
     for variance, vector in zip(variances[::-1].tolist(), vectors.T[::-1], strict=True):
         if math.sqrt(max(variance, 0.0)) > _UNDETERMINED:
@@ -775,7 +777,8 @@ def _least_squares(runs: FitRuns, start: Floats) -> tuple[Floats, Linear, Floats
         point = np.asarray(least_squares(weighted, point, slopes, bounds, loss=loss, ftol=least, **usual).x)
         residuals = runs.residuals_at(point).copy()
         if number == 0 and runs.is_motion:
-            rows, sizes = list[Indices](), list[Floats]()
+            rows = []
+            sizes = []
             for block in runs.blocks:
                 samples = residuals[block.rows]
                 noise = max(white_noise_of(samples), np.min(block.floor))

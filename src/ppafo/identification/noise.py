@@ -48,7 +48,9 @@ def burg(series: Sequence[Floats], highest: int = HIGHEST_ORDER, wanted_order: i
     """
     forward, backward = list(series), list(series)
     count, shortest = sum(map(len, series)), min(map(len, series))
-    power, coefficients, best = 1.0, list[float](), (0.0, 0)
+    power = 1.0
+    coefficients = []
+    best = (0.0, 0)
     for order in range(1, min(highest, count // SAMPLES_PER_COEFFICIENT, shortest - 2) + 1):
         ahead, behind = [errors[1:] for errors in forward], [errors[:-1] for errors in backward]
         across = sum(float(np.sum(a * b)) for a, b in zip(ahead, behind, strict=True))

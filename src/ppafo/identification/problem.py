@@ -166,7 +166,8 @@ def load_problem(path: str | Path) -> ProblemFile:
     # Each may be left out, which the layout allows, but not both.
     if not problem.procedure and problem.trajectory is None:
         raise IdentificationError(f"{file}: has neither a [[procedure]] nor a [trajectory]")
-    maps, recordings = dict[str, str | None](), dict[str, str]()
+    maps = {}
+    recordings = dict[str, str]()
     for number, item in enumerate(problem.procedure, start=1):
         maps[f"procedure.{number}.columns"] = item.columns
         recordings |= {f"procedure.{number}.recordings.{at}": name for at, name in enumerate(item.recordings, start=1)}

@@ -59,7 +59,8 @@ def with_tried_units(
     channels = {name: channel for source in sources for name, channel in source.recording.channels.items()}
     # Recordings of a load or of a difference, which tell their unit by no scatter, have no meter beside them.
     others = [name for name, channel in channels.items() if channel.unit in _OTHER_UNITS]
-    impossible, far = list[str](), list[str]()
+    impossible = []
+    far = []
     for estimate in result.estimates:
         ratio = estimate.value / (context.number(estimate.path) or math.inf) or 1.0
         is_coefficient = estimate.path.endswith(".discharge_coefficient") and estimate.value > LARGEST_COEFFICIENT
@@ -151,7 +152,8 @@ def read_tasks(
 
     A recording may serve two different procedures. Raises IdentificationError if a procedure uses a recording twice.
     """
-    tasks, used = list[tuple[BenchProblem, tuple[RecordingSource, ...], str]](), list[UsedRecording]()
+    tasks = []
+    used = []
     for number, procedure in enumerate(procedures, start=1):
         kind, gas = procedure.kind, getattr(procedure, "gas", None)
         row_time = _ROW_TIME if kind in procedure.steady else None

@@ -418,7 +418,8 @@ def _schema(
     field: Field, declare: Declare, document: Mapping[str, Any], path: str, definitions: dict[str, dict[str, Any]]
 ) -> dict[str, Any]:
     """Return the schema of a field with its description."""
-    summary, form = "", dict[str, Any]()
+    summary = ""
+    form = {}
     if isinstance(field, Quantity):
         default = "" if field.default is None else f"; {field.default:g} unless given"
         default = "; the device's unless given" if field.default is None and field.follows else default

@@ -121,7 +121,8 @@ def resolved(
     held = holding(graph, present)
     links = held | {path: link for path, link in (anew or {}).items() if path in held}
     turned = [path for path in held if links[path][0].sources != held[path][0].sources]
-    moved, computed = dict(replaced), dict[Any, Any]()
+    moved = dict(replaced)
+    computed = dict[Any, Any]()
     for path, link in acting(links, replaced, turned).items():
         moved[path] = link.number(lambda source: moved[source] if source in moved else present[source], computed)
     return moved

@@ -203,7 +203,8 @@ def _parameter_set(document: Mapping[str, Any], fields: Fields, file: str, folde
     # Section by section, the valves last.
     paths.sort(key=lambda path: (_ORDER.index(path.partition(".")[0]), path.startswith("reported.valves.")))
     entries = {path: table for path in paths if (table := value_at(document, path)) is not None}
-    texts, numbers = dict[str, TextEntry](), dict[str, Entry]()
+    texts = {}
+    numbers = {}
     for path, table in entries.items():
         if isinstance(fields[f"{path}.value"], Quantity):
             numbers[path] = record_from(Entry, table)

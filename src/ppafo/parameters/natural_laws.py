@@ -62,7 +62,8 @@ def actuator_departure(model: ActuatorModel, plant: Any) -> LawDeparture:
     """
     width, room = plant.angle_max - plant.angle_min, plant.atmospheric_pressure
     gauge, turn = plant.supply_pressure - room, _STEP * width
-    push, found = _STEP * gauge, list[tuple[float, float, str]]()
+    push = _STEP * gauge
+    found = []
     for fraction, pair in product(_ANGLES, _PRESSURES):
         angle, pressures = plant.angle_min + fraction * width, [room + share * gauge for share in pair]
         place = f"at {math.degrees(angle):.4g} deg with {_kilopascals(pressures[0])} and {_kilopascals(pressures[1])}"
@@ -107,7 +108,10 @@ def valve_departure(model: ValveModel, settings: Any, plant: Any) -> LawDepartur
     pressure = room + 0.5 * (plant.supply_pressure - room)
     full, found = plant.valve_conductance * max(plant.supply_pressure, room), [LawDeparture(0.0, "")]
     for command in _COMMANDS:
-        state, time, parts, flows = model.state(), 0.0, 0, list[list[float]]()
+        state = model.state()
+        time = 0.0
+        parts = 0
+        flows = []
         for step in _STEPS:
             end = time + step
             while time < end and parts < _MOST_PARTS:
@@ -178,7 +182,8 @@ def broken_laws(device: Device) -> Iterator[str]:
     effects = [effect for effect in effects_of(device) if not EFFECTS.is_own(effect.name)]
     if ACTUATORS.is_own(actuator) and VALVES.is_own(valve) and not effects:
         return
-    plant, departures = plant_parameters(device), list[tuple[str, LawDeparture]]()
+    plant = plant_parameters(device)
+    departures = []
     if not ACTUATORS.is_own(actuator):
         departures.append((f"actuator '{actuator}'", actuator_departure(ACTUATORS[actuator].model, plant)))
     if not VALVES.is_own(valve):

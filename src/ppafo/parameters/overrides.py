@@ -62,7 +62,9 @@ def read_overrides(texts: Iterable[str], error: type[PpafoError] = ParameterErro
 
     Raises ``error`` for all other texts, in sorted order.
     """
-    in_order, wrong, read = tuple(texts), list[PpafoError](), dict[str, Override]()
+    in_order = tuple(texts)
+    wrong = []
+    read = {}
     for text in sorted(in_order):
         on_one_line = one_line(text)
         path, separator, value = (part.strip() for part in on_one_line.partition("="))

@@ -341,7 +341,8 @@ def _read(
 ) -> tuple[Recording, dict[str, dict[str, float]]]:
     """Return the recording of the sensors, and offset [SI] and gain error [-] of each; other channels are exact."""
     ambient, is_run = device.supply.atmospheric_pressure, EXPERIMENTS[experiment].at_rest is None
-    channels, errors = dict[str, Floats](), dict[str, dict[str, float]]()
+    channels = {}
+    errors = {}
     for name, values in true.items():
         channels[name] = values
         if name not in SENSORS or (is_run and name == "torque"):

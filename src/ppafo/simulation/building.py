@@ -275,7 +275,8 @@ def with_settings(reading: DocumentReader, scenario: Scenario, declared: tuple[Q
     links = default_links(
         scenario, (item for item in declared if value_at(reading.document, f"controller.{item.name}") is None)
     )
-    settings, computed = dict[str, float](), dict[object, object]()
+    settings = dict[str, float]()
+    computed = dict[object, object]()
 
     def number(path: str) -> float:
         # A setting may follow one before it.

@@ -235,7 +235,9 @@ def _compared(
     result: RecordedResult, repeats: Sequence[tuple[str, RecordedResult]]
 ) -> tuple[list[NumberCheck], list[NumberCheck], list[float]]:
     """Metrics and channels of a result with their changes in repeats, by kind, and times [s] at which repeats part."""
-    recording, courses, metrics = result.recording, list[NumberCheck](), list[NumberCheck]()
+    recording = result.recording
+    courses = []
+    metrics = []
     parted = [repeat.status.time for _, repeat in repeats if repeat.status.time is not None]
     for name, (compared, unit, promised_error) in _SIGNALS.items():
         channels = [channel for channel in compared if channel in recording]
@@ -268,7 +270,8 @@ def estimated_error(result: RecordedResult, fine: RecordedResult) -> ErrorEstima
     def error(row: NumberCheck) -> float:
         return MARGIN * abs(row.changes[FINER]) if fine.status.is_completed else math.inf
 
-    errors, shares = {row.unit: error(row) for row in courses}, dict[str, float]()
+    errors = {row.unit: error(row) for row in courses}
+    shares = {}
     known = [row for row in metrics if row.name in result.metrics]
     for row in (row for row in known if math.isfinite(row.value)):
         # Relative to the metric's value or, if larger, to the range of its quantity.

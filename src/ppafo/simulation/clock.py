@@ -85,7 +85,8 @@ def read_period(reading: DocumentReader, default: float = 0.0) -> tuple[float, s
 def links_of_times(document: Mapping[str, Any]) -> Graph:
     """Return the links of the step and the output interval to the other times, if the document does not give them."""
     step, output = (value_at(document, path) is not None for path in (_STEP_PATH, _OUTPUT_PATH))
-    sources, found = (_DURATION_PATH, PERIOD_PATH), dict[str, tuple[Link, ...]]()
+    sources = (_DURATION_PATH, PERIOD_PATH)
+    found = {}
     if not step:
         with_output = Link((*sources, _OUTPUT_PATH), step_with_output)
         found[_STEP_PATH] = (with_output if output else Link(sources, step_unless_given),)

@@ -88,7 +88,8 @@ class DocumentReader:
         self, section: str, quantities: tuple[Quantity, ...], atmosphere: float = STANDARD_ATMOSPHERE
     ) -> dict[str, float]:
         """Return all values of a section by name, in SI; gauge pressures refer to ``atmosphere`` [Pa absolute]."""
-        values, wrong = dict[str, float](), list[PpafoError]()
+        values = {}
+        wrong = list[PpafoError]()
         for quantity in quantities:
             with noted_in(wrong):
                 values[quantity.name] = self.number(f"{section}.{quantity.name}", quantity, atmosphere)

@@ -24,7 +24,7 @@ from ppafo.parameters.declaration import (
 )
 from ppafo.parameters.device import Device, Orifice, SonicOrifice, held_in
 from ppafo.parameters.effects import number_under, part_of
-from ppafo.parameters.graph import Asked, Graph, Link, left, resolved
+from ppafo.parameters.graph import Asked, Graph, left, resolved
 from ppafo.parameters.overrides import one_path, read_overrides
 from ppafo.simulation.clock import PERIOD_PATH, RATE_PATH
 from ppafo.simulation.declaration import LOCKED_ANGLE
@@ -155,7 +155,8 @@ def moving_together(scenario: Scenario, replaced: Mapping[str, Any]) -> dict[str
 
 def _moved(scenario: Scenario, replaced: Mapping[str, Any]) -> tuple[dict[str, Any], Scenario, Graph]:
     """Return numbers with all that follow them, the scenario with orifices given in their other form, and its links."""
-    changed, anew = scenario, dict[str, tuple[Link, ...]]()
+    changed = scenario
+    anew = {}
     for section, place in ORIFICES.items():
         form = other_form(scenario.device, section)
         paths = [f"{section}.{name}" for name in form]

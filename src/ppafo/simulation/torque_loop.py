@@ -537,7 +537,8 @@ def quicker_at(parts: LoopParts, numbers: Mapping[str, float], angle: float) -> 
     """
     if parts.seen.is_locked or parts.seen.profile in _LEADING:
         return 1.0
-    kept, by = dict[Any, Any](), _OF_PRESSURE.get(parts.controlled)
+    kept = dict[Any, Any]()
+    by = _OF_PRESSURE.get(parts.controlled)
     actuator, stops, around = (parts.group(name, numbers, kept) for name in ("actuator", "stops", "around"))
     places = parts.chambers_at(actuator, stops, around, angle), parts.group("usual", numbers, kept)
     rates = [torque_per_flow(mean, around) if by is None else per_flow(mean, around, *by) for mean in places]

@@ -241,7 +241,8 @@ def recording_of_columns(
 
     if not len(values[0]):
         raise DataError("has a header but no samples")
-    channels, faults = dict[str, Channel](), list[PpafoError]()
+    channels = {}
+    faults = list[PpafoError]()
     for column, numbers in zip(columns, values, strict=True):
         with noted_in(faults), refused_as(DataError, f"column '{column.name} [{column.unit}]'", UnitError):
             if column.si_unit == PLAIN_NUMBER and column.unit.removeprefix("m") in ("V", "A"):

@@ -86,7 +86,9 @@ def read_mapped_text(content: bytes, columns: ColumnMap, map_name: str) -> Mappe
     lines = text_of(content, columns.encoding, remedy='; give encoding = "latin-1" for a Latin-1 file').splitlines()
     if any(map(_SERIAL_MONITOR.match, lines)):
         lines = _with_stamps_as_column(lines, columns)
-    faults, indices, of_date = list[PpafoError](), dict[str, int](), list[int]()
+    faults = list[PpafoError]()
+    indices = {}
+    of_date = []
     with in_map(map_name):
         names, first_row, rows = _begun(lines, columns)
         titles = names or [str(number) for number in range(1, len(first_row) + 1)]
@@ -103,7 +105,9 @@ def read_mapped_text(content: bytes, columns: ColumnMap, map_name: str) -> Mappe
     of_clock = [indices.pop(TIME)] if is_time_of_day else []
     of_date = of_date if is_time_of_day else []
     numbers = [(_NumberColumn(name, titles[index], columns), index, array("d")) for name, index in indices.items()]
-    clock, dates, stamps = list[str](), list[str](), array("q")
+    clock = []
+    dates = []
+    stamps = array("q")
     # Row by row, so that no cell of a large file is kept as a text.
     for line, row in rows:
         width = len(row)
@@ -271,7 +275,8 @@ def read_trials(
             else read_mapped_matlab(content, columns, map_name)
         )
         with in_map(map_name):
-            faults, channels = list[PpafoError](), dict[str, Channel]()
+            faults = list[PpafoError]()
+            channels = {}
             for name, mapped in columns.channels.items():
                 with noted_in(faults):
                     if name == TIME:

@@ -229,7 +229,8 @@ def read_mapped_matlab(file: _MatlabFile, columns: ColumnMap, map_name: str) -> 
     Raises DataError with the key of a channel whose variable is absent or unusable, and with the map if it has a name.
     """
     with in_map(map_name):
-        faults, named = list[PpafoError](), dict[str, str]()
+        faults = list[PpafoError]()
+        named = {}
         for name, mapped in columns.channels.items():
             with noted_in(faults):
                 if mapped.column is not None:

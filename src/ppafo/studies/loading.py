@@ -212,7 +212,9 @@ def _load(
 
 def _build(parsed: StudyFile, document: dict[str, Any], source: _StudySource, changes: tuple[str, ...]) -> Study:
     """Build the study of a parsed study file in SI units; StudyError with all mistakes that stand in the file."""
-    wrong, configurations, vary = list[PpafoError](), list[Configuration](), parsed.vary
+    wrong = list[PpafoError]()
+    configurations = []
+    vary = parsed.vary
     sections, paths = parsed.configurations, [entry["path"] for entry in parsed.vary]
     for section in sections:
         with noted_in(wrong):
@@ -233,7 +235,8 @@ def _build(parsed: StudyFile, document: dict[str, Any], source: _StudySource, ch
     # All else is about the scenarios.
     raise_noted(wrong)
     scenarios = [configuration.scenario for configuration in configurations]
-    varied, independent = dict[str, VariedPath](), list[Axis | RandomValue]()
+    varied = {}
+    independent = []
     followed = {entry["path"]: entry[SAME_AS] for entry in vary if entry["kind"] == SAME_AS}
     for entry in vary:
         with noted_in(wrong):

@@ -47,7 +47,9 @@ class Chunk:
 
 def chunks_of(study: Study) -> list[Chunk]:
     """Return the chunks of a study, as many for each configuration: the first ones short, each twice the one before."""
-    size, chunks, total = _full_size(study), list[Chunk](), study.runs_of_configuration
+    size = _full_size(study)
+    chunks = list[Chunk]()
+    total = study.runs_of_configuration
     for configuration in range(len(study.configurations)):
         first, runs = 0, size if study.runs_of_chunk is not None else min(size, _FIRST_RUNS_OF_CHUNK)
         while first < total:

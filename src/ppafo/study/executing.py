@@ -61,7 +61,9 @@ def computed_by(
     again, and for an answer to another submission. Before an executor that takes no more work is refused, the blocks
     that it has finished are yielded.
     """
-    ended, lost, waiting = SimpleQueue[Future[Any]](), Counter[int](), dict[Future[Any], tuple[int, str]]()
+    ended = SimpleQueue[Future[Any]]()
+    lost = Counter[int]()
+    waiting = {}
     faults = list[PpafoError]()
     said = "executor: a class or function of the study cannot be sent to workers"
     with refused_as(StudyError, said, pickle.PicklingError, AttributeError, TypeError):

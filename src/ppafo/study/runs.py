@@ -100,7 +100,7 @@ class Runs:
         if not self._counter.done:
             # A model may be compiled before the first run ends.
             self._counter.add(0, 0)
-        parts = dict[int, Rows]()
+        parts = {}
         for number, part in self._parts(columns, len(next(iter(columns.values())))):
             parts[number] = part
             count, failures = part[FAILED].size, int(part[FAILED].sum())

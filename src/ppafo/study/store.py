@@ -185,7 +185,7 @@ class StudyFolder:
 
     def finished(self, chunks: Sequence[Chunk]) -> dict[int, int]:
         """Return the number of failed runs of each chunk that is there, by chunk number."""
-        found = dict[int, int]()
+        found = {}
         for number in (chunk.number for chunk in chunks):
             with contextlib.suppress(OSError, ValueError):
                 note = self.document(_note_of(chunk_file(number)))
@@ -240,7 +240,8 @@ def manifest(study: Study) -> dict[str, Any]:
 
     Without time and computer: two studies with the same manifest have the same results.
     """
-    scenarios, programs = dict[str, Any](), dict[str, str]()
+    scenarios = {}
+    programs = {}
     for name, scenario in ((each.name, each.scenario) for each in study.configurations):
         document, custom = scenario_document(scenario), scenario.controller.custom
         # Without the file it came from, which may lie elsewhere the next time.

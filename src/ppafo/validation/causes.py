@@ -274,7 +274,9 @@ def record_of(agreement: RecordingAgreement) -> Record:
     """Prepare a recording: faulty samples marked, sensitivity of the readings to each initial value."""
     compared = [channel for channel in agreement.channels if channel.channel in SENSORS] or agreement.channels[:1]
     noise = np.array([channel.noise for channel in compared])
-    good, words, has_few = np.ones((len(compared), len(agreement.measured))), list[str](), True
+    good = np.ones((len(compared), len(agreement.measured)))
+    words = []
+    has_few = True
     for row, channel in enumerate(compared):
         values, residuals = channel.values, channel.residuals
         # Samples in a channel that the model explains are right, however they look; so are those of one that stands
@@ -298,7 +300,8 @@ def record_of(agreement: RecordingAgreement) -> Record:
         words=tuple(words),
         has_few=has_few,
     )
-    request, starts = agreement.request, list[dict[str, float]]()
+    request = agreement.request
+    starts = []
     for name, error in zip(record.channels, noise / math.sqrt(samples_at_rest(agreement.measured)), strict=True):
         if name in SENSORS and name not in request.settings.initial:
             # A vane at its upper stop can only move down.
@@ -380,7 +383,7 @@ def residuals_of(record: Record, replayed: Replayed, change: ModelChange) -> Sca
     interval = float(np.median(np.diff(record.agreement.measured.time)))
     # No quantity stands twice in one fit: beside a delay of its own a change gets no free one, which would take a part.
     longest = 0.0 if change.has_delay else record.agreement.request.settings.longest_delay
-    options = list[Floats]()
+    options = []
     for start in {0.0, record.agreement.delay} if longest > 0.0 else {0.0}:
         delay, errors = start, np.zeros(0)
         for _ in range(STEPS + 1 if longest > 0.0 else 1):
@@ -753,7 +756,9 @@ def causes_of(agreements: Sequence[RecordingAgreement], report: Report = report_
     none = search.evaluated([ModelChange()])[0]
     if none is None or none.is_noise:
         return Diagnosis(is_noise=none is not None)
-    search, tried, request = replace(search, none=none), list[Cause](), agreements[0].request
+    search = replace(search, none=none)
+    tried = []
+    request = agreements[0].request
     is_measured = request.settings.motion == "measured"
     for row in visible(records, request.settings.motion):
         tried += search.compared([row])
@@ -891,7 +896,9 @@ class CauseSearch:
 
         Causes whose best magnitude is at an end of the grid are rejected.
         """
-        best, worse, rising = dict[str, Cause](), dict[str, float](), set[str]()
+        best = dict[str, Cause]()
+        worse = dict[str, float]()
+        rising = set[str]()
         trials = [(row, size) for row in rows for size in row.grid]
         for step in range(STEPS + _OF_BEST + _OF_RISING + 1):
             rising.clear()
@@ -919,7 +926,7 @@ class CauseSearch:
             # slope. The others end between neighbours on their grids.
             again = [cause for cause in improved if cause.name in worse and not is_last]
             trials = [(cause, cause.size + _SHORTER * (worse[cause.name] - cause.size)) for cause in again]
-            moved = list[_Trial]()
+            moved = []
             for cause in (cause for cause in improved if cause not in again):
                 share = _FINE_DIFFERENCE if is_last else _DIFFERENCE
                 length = share * (cause.neighbours[1] - cause.neighbours[0])
@@ -943,7 +950,7 @@ class CauseSearch:
         """Return each additional cause with the derivative of the ``residuals`` under a change by its magnitude."""
         # A delay of all sensors is free already, unless the change has one itself.
         is_free = self.records[0].agreement.request.settings.longest_delay > 0.0 and not change.has_delay
-        trials = list[_Trial]()
+        trials = []
         for row in rows:
             # From what is off no straight line leads to a ratio.
             if not (row.is_off or (is_free and row.first.has_delay)):
@@ -1018,7 +1025,9 @@ class CauseSearch:
         slopes = self.slopes(first.at(first.size), first.residuals, sized) if is_fitted else []
         if self.needs_another(first, slopes):
             return Diagnosis(None, first, len(tried), has_second=True)
-        none, larger, changes = self.none.errors, list[Cause](), list[ModelChange]()
+        none = self.none.errors
+        larger = []
+        changes = []
         for cause in (cause for cause in slopes if cause.name not in known):
             usual = [other for other in slopes if other.is_of_bench and other is not cause]
             fitted = _bounded([replace(cause, usual=math.inf), *usual], none)
@@ -1075,9 +1084,10 @@ class CauseSearch:
 
         The common delay is by its rule: none at its limit, and none beside a cause that is a delay itself.
         """
-        found = list[Cause]()
+        found = []
         for cause, replays in zip(causes, self._replays([cause.at(cause.size) for cause in causes]), strict=True):
-            change, agreements = cause.at(cause.size), list[RecordingAgreement]()
+            change = cause.at(cause.size)
+            agreements = []
             for record, request, replayed in replays:
                 recording = request.measured.recording
                 for name, sensor in change.sensors.items():

@@ -240,7 +240,9 @@ def load_design(problem: str | Path, *, profile: str | Path | None = None, plugi
     with at_fault("problem"):
         content = FILE.read(problem)
     document = checked_record(SizingFile, FILE.parse(content, file), file, StudyError, content)
-    wrong, valves, bottles = list[PpafoError](), dict[str, Mapping[str, float]](), list[Bottle]()
+    wrong = list[PpafoError]()
+    valves = {}
+    bottles = []
     atmosphere, largest, pressures = STANDARD_ATMOSPHERE, 1.0, []
     with noted_in(wrong):
         if profile:

@@ -324,7 +324,8 @@ def size_for_profile(problem: SizingProblem, threads: int | None, report: Report
     Raises StudyError if all runs fail.
     """
     started = time.perf_counter()
-    trials, valves = Trials(problem, threads), list[SizedValve]()
+    trials = Trials(problem, threads)
+    valves = list[SizedValve]()
     for name in problem.valves:
         elapsed = time.perf_counter() - started
         report(Progress(f"trying {name}", len(valves), len(problem.valves), 0, 0, elapsed, "valves"))
@@ -353,7 +354,10 @@ def _size_valve(trials: Trials, name: str) -> SizedValve:
         measure = masses if np.isfinite(masses).any() else ~works
     chosen = int(np.argmin(measure))
     pressure, error, gas, gains, _ = tried[chosen].tolist()
-    lowest, bottle, remarks, margins = None, None, list[str](), dict[str, float | None]()
+    lowest = None
+    bottle = None
+    remarks = list[str]()
+    margins = dict[str, float | None]()
     if works.any():
         lowest = float(tried["pressure"][works][0])
         bottle, is_cold = lasting_bottle(problem, gas, float(in_all[chosen]), pressure)
@@ -421,7 +425,9 @@ def try_pressures(trials: Trials, name: str) -> Trial:
 
     Gains of the next scale are tried unless the torque or the requested range limits the valve.
     """
-    problem, valve, found = trials.problem, trials.problem.valves[name], list[tuple[float, float, int, Trial]]()
+    problem = trials.problem
+    valve = trials.problem.valves[name]
+    found = list[tuple[float, float, int, Trial]]()
     pressures = np.linspace(problem.lowest_pressure, problem.highest_pressure, GRID)
     for first in range(0, len(trials.gain_sets), trials.combinations):
         tried = trials.best(valve, pressures, like=first)
@@ -578,7 +584,9 @@ def _tables(sizing: Sizing) -> tuple[Section, Section]:
     gas, fraction = Kind("", "kg", "gas mass", ".3g"), Kind(quantity="fraction", form=".0f")
     quantities = CONTROLLERS[sizing.problem.scenario.controller.kind].quantities
     units = {f"controller.{quantity.name}": quantity.unit for quantity in quantities}
-    rows, margins, working = list[Any](), list[Any](), [sized for sized in sizing.valves if sized.works]
+    rows = list[Any]()
+    margins = list[Any]()
+    working = [sized for sized in sizing.valves if sized.works]
     for sized in sizing.valves:
         if not sized.works:
             rows.append((sized.name, None, None, f"{TORQUE.number(sized.error)} at best", *(None,) * 3, sized.limit))
@@ -611,7 +619,8 @@ def _pressure_panels(sizing: Sizing) -> list[Panel]:
     limit, colours = sizing.problem.largest_error, _colours(sizing)
     dotted = {"marker": ".", "markersize": 4}
     ringed = {"linestyle": "", "marker": "o", "markersize": 9, "markerfacecolor": "none", "markeredgewidth": 1.4}
-    errors, gases = [Mark("level", (), limit, colour=BLACK, style={"linewidth": 1.0, "linestyle": "--"})], list[Mark]()
+    errors = [Mark("level", (), limit, colour=BLACK, style={"linewidth": 1.0, "linestyle": "--"})]
+    gases = list[Mark]()
     rings = list[Mark]()
     for sized in sizing.valves:
         (pressure, error, gas), colour = (

@@ -390,7 +390,8 @@ def of_recording(
     The regulator of a bottle of the package has the supply pressure that a result folder states, unless an override
     sets it.
     """
-    full, units = load_bottle(bottle, overrides), dict[str, str]()
+    full = load_bottle(bottle, overrides)
+    units = {}
     recording = use if isinstance(use, Recording) else read_recording(Path(use))
     run = Path() if isinstance(use, Recording) else Path(use) / RUN_FILE
     if run.is_file():

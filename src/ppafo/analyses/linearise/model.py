@@ -742,7 +742,8 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
             point.append((role, name, unit, kind.text(model.values[name])))
     # A complex pair is one row.
     for pole in model.poles.tolist():
-        size, row = abs(pole), list[str | float | None]()
+        size = abs(pole)
+        row = []
         if abs(pole.imag) <= 1.0e-6 * size:
             row = [f"{pole.real:.5g}", None if pole.real == 0.0 else -1.0 / pole.real, None, None]
         elif pole.imag > 0.0:

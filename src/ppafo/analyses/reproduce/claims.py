@@ -207,7 +207,7 @@ def load_publication(name_or_path: str | Path) -> tuple[Claim, ...]:
             given, known = ", ".join(entry.arguments) or "none", ", ".join(takes) or "none"
             hints = "".join(nearest_name(name, takes) for name in entry.arguments if name not in takes)
             raise ScenarioError(f"{where}.arguments: {entry.computation} takes {known}; given: {given}{hints}")
-        values = dict[str, float]()
+        values = {}
         for name, unit in takes.items():
             key, text = f"{where}.arguments.{name}", entry.arguments[name]
             with refused_as(ScenarioError, key, UnitError):

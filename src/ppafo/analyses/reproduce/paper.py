@@ -294,7 +294,8 @@ def _bench_figure() -> tuple[BenchResult, BenchResult]:
     planted, inertia = load_parameter_set(PLANTED_SET), "foot_plate.inertia"
     # The inertia is exact, and nothing is known of the friction.
     known = replace(planted, numbers={inertia: planted.numbers[inertia]})
-    context, results = BenchContext(known, "", "figure 3", Tolerances(held=0.0)), list[BenchResult]()
+    context = BenchContext(known, "", "figure 3", Tolerances(held=0.0))
+    results = []
     for kind in ("static-torque", "free-decay"):
         source = RecordingSource(record(kind, BENCH_PRESET, RIG_SEED, PLANTED_SET).recording, user=kind)
         table = record_from(LAWS[kind], {"kind": kind, "recordings": [source.name]})
@@ -308,8 +309,9 @@ def _bench_figure() -> tuple[BenchResult, BenchResult]:
 def arithmetic_claims(reported: ParameterSet) -> list[Claim]:
     """Return the claims that the paper's numbers alone decide: what the audit of its set finds, and percentages."""
     entries, evidence = paper_entries(), Evidence(reported)
-    found, claims = {finding.id: finding for finding in findings_of(reported)}, list[Claim]()
-    tested = dict[str, tuple[bool, list[str]]]()
+    found = {finding.id: finding for finding in findings_of(reported)}
+    claims = []
+    tested = {}
     for identifier, (ids, side, value) in _AUDITED.items():
         findings = [found[name] for name in ids if name in found]
         ours = [(finding.sides[side], finding.values[value].path) for finding in findings]
@@ -512,7 +514,8 @@ def phased_runs(solenoid: Result) -> tuple[Floats, Floats]:
         gas = GRAMS_PER_KILOGRAM * solenoid.metrics["gas_supplied"].value
         return np.array([solenoid.metrics["rms_error"].value]), np.array([gas])
     fine, duration = replace(scenario.run, step=_FINE_STEP, output_interval=_FINE_STEP), scenario.run.duration
-    slope, runs = reference.settings["level"] / reference.settings["ramp_time"], list[tuple[float, float]]()
+    slope = reference.settings["level"] / reference.settings["ramp_time"]
+    runs = []
     for tie in (_TIE, -_TIE):
         # Until the first decision, a constant reference just off 0 calls one valve at once and holds it on.
         constant = _with_reference(scenario, start_level=tie, level=tie)

@@ -133,7 +133,8 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
     simulated test bench.
     """
     missed, rows, synthetic = reproduction.missed, reproduction.readings_of_u, reproduction.synthetic
-    said, parts = [NOTHING_CONFIRMED], list[Section]()
+    said = [NOTHING_CONFIRMED]
+    parts = []
     if reproduction.overrides:
         words = f"not the paper's device: values changed with {override_text(reproduction.overrides)}"
         said.append(f"{words}; the verdicts still compare this device with the paper")
@@ -181,7 +182,8 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
     runs = (reproduction.solenoid, reproduction.proportional, reproduction.step)
     completed = load_parameter_set(reproduction.step.scenario.origin.parameter_set)
     changed = [word for override in reproduction.overrides for word in ("--set", override)]
-    slope, groups = 0.0, dict[tuple[str, ...], list[paper.AssumedValue]]()
+    slope = 0.0
+    groups = dict[tuple[str, ...], list[paper.AssumedValue]]()
     if not isinstance(synthetic, str):
         inertia = number_in_si(reported, "foot_plate.inertia") or 1.0
         slope = -synthetic.decay["friction.viscous_damping"].value / inertia
@@ -234,7 +236,8 @@ def _step_panels(reproduction: Reproduction) -> list[Panel]:
         Mark("text", time + 0.01 * end, angle, label=name, colour=style.GREY, style=small)
         for time, angle, name in zip(at, (120.0, 25.0), ("breaks away", "at rest"), strict=False)
     ]
-    signals, errors = list[Panel](), list[Panel]()
+    signals = []
+    errors = []
     for number, (title, kind, look, inset) in enumerate(_STEP_PANELS):
         model = _step_curves(recording, atmosphere)[number]
         time = _MILLISECONDS * recording.time
@@ -308,7 +311,8 @@ def _torque_task_panels(reproduction: Reproduction) -> list[Panel]:
         edges = (middle - half,) * 2, (middle + half,) * 2
         return Mark("band", ends, edges, label=label, colour=colour, style={"alpha": alpha})
 
-    torques, gas = list[list[Mark]](), list[Mark]()
+    torques = []
+    gas = []
     errors = [Mark("level", y=0.0, colour=style.GREY, style={"linewidth": 0.8})]
     # Grey in the legend, as the bars have the colours of the valves.
     places = [

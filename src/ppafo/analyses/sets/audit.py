@@ -44,7 +44,8 @@ def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
         authors = f"{', '.join(stated.authors)}: " if stated.authors else ""
         year, doi = f" ({stated.year})" if stated.year else "", f" doi:{stated.doi}" if stated.doi else ""
         cited = f"{authors}{stated.title}{year}.{doi} {stated.note}".strip()
-    rows, remarks = list[tuple[str, ...]](), list[str]()
+    rows = []
+    remarks = []
     for value in document["values"]:
         number = value["value"]
         # A flag is a number to Python: it is tested first.

@@ -110,7 +110,9 @@ def finding_of(comparison: WalkComparison) -> ask.Finding[dict[str, Any]]:
     title = f" ({motion.gait.title})" if motion.gait.title else ""
     set_up = (scenario.description, f"device '{scenario.device.name}', gait '{motion.gait.name}'{title}", law.summary)
     mended = ask.usage_text(ask.reloaded(scenario, verdict.mended)) if verdict.mended else ""
-    supply, bottle, pictures = worn.supply, list[ask.Section](), list[ask.Section]()
+    supply = worn.supply
+    bottle = []
+    pictures = []
     remarks = [*person_remarks(scenario)]
     pressures = scenario.device.supply.pressure, scenario.device.supply.dorsiflexion_pressure
     for number, pressure in enumerate(pressures, 1):
@@ -384,7 +386,8 @@ def _bottle_facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str
 def comparison_table(comparison: WalkComparison) -> list[ask.Column]:
     """Return the table of metrics by row, with columns for the device, without it, and a healthy ankle."""
     walks = {"with": comparison.with_device.metrics, "without": comparison.without_device.metrics}
-    walker, columns = comparison.with_device.scenario, dict[str, dict[str, float | str | None]]()
+    walker = comparison.with_device.scenario
+    columns = {}
     for head, metrics in (walks | {"healthy": comparison.healthy}).items():
         values: dict[str, float | str | None] = {"body_mass": walk_of(walker).wearer.body_mass}
         values |= {name: metric.value for name, metric in metrics.items()}

@@ -113,7 +113,8 @@ def follow_entry(
     ``links`` are those of the scenario that hold, and of its times.
     """
     scenario, values = preparation.scenario, {setting.path: setting.value for setting in settings}
-    cells, lines = cells_of(scenario, settings), list[str]()
+    cells = cells_of(scenario, settings)
+    lines = list[str]()
     of_loop = [link for follows in links.values() for link in follows if isinstance(link, LoopLink)]
     for path, follows in links.items():
         if of_loop and follows[0] is of_loop[0]:

@@ -8,7 +8,7 @@ from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.run import NEVER_FAILED
 from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.exports import filled, in_comment, in_markdown, template
-from ppafo.exports.c_library.library import Condition, Library, c_identifier
+from ppafo.exports.c_library.library import Library, c_identifier
 from ppafo.exports.c_library.program import c_text_of_run
 from ppafo.exports.c_library.settings import choosing, limits_in_c, numbers_of_second_chamber
 from ppafo.metrics import METRICS
@@ -124,7 +124,8 @@ def _words(library: Library, name: str) -> dict[str, str]:
         meaning = "; ".join(filter(None, (quantity.summary or quantity.name, " ".join(limits))))
         fields.append((setting.name, quantity.unit, library.worded(meaning)))
     # Conditions under which settings require another compiled program, each with the setting to report.
-    values, other_program = {setting.name: setting.value for setting in settings}, list[Condition]()
+    values = {setting.name: setting.value for setting in settings}
+    other_program = []
     for names, is_above in library.switches:
         if is_above:
             # The setting that switches the program on is the one to name where all of them are 0.
@@ -208,7 +209,8 @@ def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
     selecting = f"which settings of valve and sensors are 0 (here {', '.join([*zero, *flawless]) or 'none'})"
     of_both = [*_fixed_of_device(scenario), selecting]
     # A missing chamber has the pressure of the atmosphere; its other numbers are constants and omitted.
-    absent, followed = numbers_of_second_chamber(scenario), list[str]()
+    absent = numbers_of_second_chamber(scenario)
+    followed = []
     for path, follows in links.items():
         paths = [each for link in follows for each in link.sources if each not in absent or "pressure" in each]
         paths = [ATMOSPHERE_PATH if each in absent else each for each in paths]

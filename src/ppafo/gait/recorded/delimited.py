@@ -171,7 +171,8 @@ def merged(
     for name, own in zip(written, columns, strict=True):
         if name != own:
             twins.setdefault(marker_of(name), {}).setdefault(marker_of(own), []).append(own)
-    renamed, said = dict[str, str](), list[str]()
+    renamed = dict[str, str]()
+    said = []
     copies = set[str]()
     for label, groups in twins.items():
         first, *others = groups.values()

@@ -271,7 +271,8 @@ def find_footfalls(
 
 def _of_walk(walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Side, least: int) -> Footfalls:
     """Return the strides from the force, if these are at least ``least``, or from the source with more strides."""
-    trials, recorded = [table.events for table in tables if table.events is not None], list[Stride]()
+    trials = [table.events for table in tables if table.events is not None]
+    recorded = []
     # Events of two trials have two clocks.
     if len(trials) == 1:
         strikes, offs = (trials[0].get((side, kind), []) for kind in (STRIKE, OFF))

@@ -155,7 +155,8 @@ def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTabl
     ``_COARSE`` or more, a marker at rest does so too: then only a jump after it, further than a marker can move from
     rest in one sample interval, ``MOST_ACCELERATION`` times the interval squared [m], shows that it was lost.
     """
-    columns, remarks = dict(table.columns), list[str]()
+    columns = dict(table.columns)
+    remarks = []
     labels = dict.fromkeys(name[:-2] for name in names if name[-2:] in COORDINATES)
     interval = float(np.median(np.diff(table.time))) if table.time.size > 1 else 0.0
     for label in labels:

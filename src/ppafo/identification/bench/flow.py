@@ -467,9 +467,9 @@ class OpenValveFlowProblem(FlowLaw):
         upstream, downstream, flow = (pool(sources, name) for name in self.needed)
         # A log may begin before the gas supply is on: what is at rest then is no error of a column.
         is_open, zeros, remarks = readings_in_flow(
-            sources, _VALVE_PRESSURES, is_open, context.tolerances, _MINIMUM_SAMPLES
+            sources, VALVE_PRESSURES, is_open, context.tolerances, _MINIMUM_SAMPLES
         )
-        apart = {zero.path: zero.start for zero in zeros}.get(f"zero of {_VALVE_PRESSURES[0]}", 0.0)
+        apart = {zero.path: zero.start for zero in zeros}.get(f"zero of {VALVE_PRESSURES[0]}", 0.0)
         crossed = np.count_nonzero((downstream + apart >= upstream)[is_open])
         # Noise may exchange a few pressures that are nearly equal.
         if crossed > is_open.sum() // _FEW:

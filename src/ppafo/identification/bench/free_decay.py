@@ -267,7 +267,7 @@ class FreeDecayProblem(bench.TimedLaw):
         inertia = inertia or 1.0
         sources, remarks = readings.without_wrong_samples(sources, (_ANGLE, _VELOCITY), self.start, self.end)
         decays = [decay_of(source, self.start, self.end, number) for number, source in enumerate(sources, start=1)]
-        initial = list[FitNumber]()
+        initial = []
         rates = []
         parts = []
         for decay in decays:
@@ -333,8 +333,8 @@ class FreeDecayProblem(bench.TimedLaw):
 
 def _panels(decays: Sequence[FreeDecay], model: Floats, slowing: Slowing) -> tuple[Panel, Panel]:
     """Return two panels: angle over time, and acceleration over velocity with the straight line of equation (1)."""
-    angles = list[Mark]()
-    rates = list[Mark]()
+    angles = []
+    rates = []
     measured, fitted = "measured", "fitted"
     fastest = 0.0
     for decay in decays:

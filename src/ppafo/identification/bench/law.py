@@ -206,8 +206,8 @@ def halved_readings(
 
     ``parts`` are, for each source, the first sample of the second half, and the samples by channel.
     """
-    series = list[Floats]()
-    labels = list[tuple[str, str, str]]()
+    series = []
+    labels = []
     for number, (source, (half, channels)) in enumerate(zip(sources, parts, strict=True), start=1):
         for sensor, values in channels.items():
             series.append(values)

@@ -149,7 +149,8 @@ class ValveMapProblem(flow.FlowLaw):
                 "the command was swept in one direction only: the dead band includes half the width of any hysteresis"
             )
             remarks = (*remarks, no_play)
-        series, curves = [], list[Mark]()
+        series = []
+        curves = list[Mark]()
         for role, on in (("falling", branch == -1.0), ("rising", branch == 1.0)):
             if on.any():
                 series.append((f"command {role}", role, command[on], measured[on], model[on]))

@@ -128,7 +128,7 @@ class LeakLaw(flow.FlowLaw):
         if rival is not chosen:
             with_gap, fit_with_gap = (other, rival) if opening.has_sought_ratio else (opening, chosen)
             has_gap = fit_with_gap.low[1] > 0.0
-            quantities = list[str]()
+            quantities = []
             for number in (number for number in rival.numbers if number.text):
                 is_none = number.path == with_gap.gap.path and not has_gap
                 size = shown_text(0.0 if is_none else rival.by_name[number.path], number.unit, digits=3)
@@ -398,7 +398,7 @@ class VaneLeakProblem(LeakLaw, bench.TimedLaw):
             root = gas.specific_gas_constant * np.sqrt(gas.temperature * (gas.temperature + at[TEMPERATURE]))
             rate = root * (1.0 + at[GAS_LAW]) / ((volume or 1.0) * (1.0 + at[_VOLUME]))
             relaxation_time = longest / _RELAXED * math.exp(at[_RELAXATION])
-            pressures = list[Floats]()
+            pressures = []
             for decay in decays:
                 fuller, emptier = decay.sensors
                 first, second = (at[_START.format(name, decay.number)] for name in decay.sensors)

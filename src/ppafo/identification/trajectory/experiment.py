@@ -381,7 +381,8 @@ class TrajectoryProblem:
             experiment.check()
         if message := double_use((*self.used, *(experiment.use for experiment in self.experiments))):
             raise IdentificationError(message)
-        numbers, wrong = list[FitNumber](), list[PpafoError]()
+        numbers = []
+        wrong = list[PpafoError]()
         for parameter in self.parameters:
             for label in (label for label in parameter.recordings if label not in labels):
                 near = known_names(label, labels)

@@ -380,7 +380,8 @@ def _fit_of(problem: TrajectoryProblem, numbers: tuple[FitNumber, ...], report: 
             raise IdentificationError(f"{static.name}: high = {static.high:.6g} N m must be above {least}")
         excess = min(max(static.start - dynamic.start, low), high)
         sought[row] = replace(static, start=excess, low=low, high=high, scale=dynamic.scale, base=dynamic.name)
-    runs, finer = list[PreparedExperiment](), list[PreparedExperiment]()
+    runs = []
+    finer = []
     for experiment in problem.experiments:
         reach = reach_of([number for number in numbers if number.acts_in(experiment.label)])
         values = numbers_in(experiment.label, numbers, start)
@@ -389,7 +390,8 @@ def _fit_of(problem: TrajectoryProblem, numbers: tuple[FitNumber, ...], report: 
         # is no independent noise: all samples of a recording share it.
         finer.append(prepare(experiment, values, reach, 0.5 * runs[-1].run.step))
     report(Progress(f"trajectory fit: {count_of(len(numbers), 'number')}, {count_of(len(runs), 'recording')}"))
-    blocks, first = list[ResidualBlock](), 0
+    blocks = []
+    first = 0
     for experiment, run, *both in zip(
         problem.experiments, runs, *(signals_of(each, numbers, start[:, None]) for each in (runs, finer)), strict=True
     ):
@@ -426,11 +428,14 @@ def _result(
     problem: TrajectoryProblem, runs: Sequence[PreparedExperiment], blocks: Sequence[ResidualBlock], fitted: Fit
 ) -> TrajectoryFit:
     """Return the result of a finished search: estimates, updated tolerances, and the model beside each recording."""
-    numbers, measurements, models = fitted.numbers, [run.measured for run in runs], list[Recording]()
+    numbers = fitted.numbers
+    measurements = [run.measured for run in runs]
+    models = []
     for measured, signals in zip(measurements, signals_of(runs, numbers, fitted.values[:, None]), strict=True):
         modelled = {name: Channel(column[:, 0], measured.unit(name)) for name, column in signals.items()}
         models.append(Recording(f"model of {measured.label}", measured.time, modelled, kind="simulated"))
-    channels, outliers = list[ChannelFit](), list[str]()
+    channels = []
+    outliers = []
     conflicts = [] if fitted.conflict is None else [fitted.conflict.words]
     for number in (number for number in numbers if number.path.startswith(ZERO_OF)):
         # The zero error of a sensor stays within its limit, so a larger drift is due to the model.
@@ -459,7 +464,8 @@ def _result(
     for row in rows:
         acting = [one for one in problem.experiments if numbers[row].acts_in(one.label)]
         estimates.append(estimate_of(fitted, row, [one.trace for one in acting], conflict))
-    errors, known = np.sqrt(np.diag(fitted.covariance)), list[NuisanceParameter]()
+    errors = np.sqrt(np.diag(fitted.covariance))
+    known = []
     for number, value, error in zip(numbers, fitted.values.tolist(), errors.tolist(), strict=True):
         if number.is_tolerance:
             shares = {item.path: dict(fitted.shares[item.path]).get(number.name, 0.0) for item in estimates}
@@ -527,7 +533,9 @@ def expected_information(
     noise, all channels of the fit are compared, each with its estimated noise. The whitened Jacobian of a candidate is
     added to the information of the fit.
     """
-    benefits, found, sensors = list[ExpectedBenefit](), fit.fit, fit.fit.sensors
+    benefits = []
+    found = fit.fit
+    sensors = fit.fit.sensors
     # Another experiment says nothing of a number of one recording, such as its trigger.
     common = [index for index, number in enumerate(found.numbers) if not number.recordings]
     numbers, point = tuple(replace(found.numbers[index], base="") for index in common), found.values[common]

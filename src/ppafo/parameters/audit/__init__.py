@@ -55,7 +55,8 @@ def findings_of(audited: ParameterSet, parent: ParameterSet | None = None) -> li
     of_parent = set_or_load(parent or audited.parent or None)
     # Numbers cannot be compared without the zero of gauge pressures.
     atmospheric_pressure(audited)
-    evidence, findings = Evidence(with_followers(audited)), list[AuditFinding]()
+    evidence = Evidence(with_followers(audited))
+    findings = list[AuditFinding]()
     for question in QUESTIONS:
         with contextlib.suppress(ParameterError):
             findings.extend(question(evidence))

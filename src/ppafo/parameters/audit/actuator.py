@@ -305,7 +305,8 @@ def torque_ceiling(evidence: Evidence) -> Iterator[AuditFinding]:
     """
     shown, constant = evidence.parameter_set.shown, evidence.number(TORQUE_CONSTANT_PATH)
     supplies = {path: value for path in _SUPPLIES if (value := evidence.number(path)) is not None}
-    ceilings, why = dict[str, float](), list[str]()
+    ceilings = dict[str, float]()
+    why = []
     if supplies and evidence.parameter_set.actuator_kind != VANE:
         device = build_device(evidence.parameter_set)
         lowest, highest = float(device.actuator.angle_min), float(device.actuator.angle_max)

@@ -122,7 +122,7 @@ def unusual_text(device: Device) -> str:
 
 def unusual(evidence: Evidence) -> Iterator[AuditFinding]:
     """Warn of each proportion of a device outside its usual range, with any valve of the set."""
-    findings = dict[str, AuditFinding]()
+    findings = {}
     for valve in evidence.parameter_set.valve_kinds:
         with contextlib.suppress(ParameterError), shown_in(evidence.parameter_set.shown):
             for path, text in _unusual(build_device(evidence.parameter_set, valve)):

@@ -80,7 +80,8 @@ def missing(evidence: Evidence) -> Iterator[AuditFinding]:
 
 def contradictions(evidence: Evidence) -> Iterator[AuditFinding]:
     """Name each contradiction between values that are each in order, which prevents a run."""
-    parameter_set, found = evidence.parameter_set, dict[str, tuple[str, ...]]()
+    parameter_set = evidence.parameter_set
+    found = dict[str, tuple[str, ...]]()
     for valve in parameter_set.valve_kinds:
         # A value that is missing or wrong by itself has a finding of its own.
         with contextlib.suppress(ParameterError):
@@ -95,7 +96,7 @@ def statements(evidence: Evidence) -> Iterator[AuditFinding]:
     """Name each value whose key names no published number, or a different published number."""
     for path, entry in evidence.parameter_set.numbers.items():
         name, _, identifier = entry.key.partition("/")
-        stated = dict[str, tuple[float, str]]()
+        stated = {}
         for claim in read_publication(name)[0].claims if name in FILE.names() else ():
             if claim.published is not None:
                 stated[claim.id] = (claim.published, claim.unit)
@@ -117,7 +118,7 @@ def statements(evidence: Evidence) -> Iterator[AuditFinding]:
 
 def dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
     """Name each value in the unit of its reciprocal, and all other values whose unit does not fit their equation."""
-    foreign = dict[str, UnitError]()
+    foreign = {}
     for path, entry in evidence.parameter_set.numbers.items():
         quantity, value = evidence.declared[path], 0.0
         inverse = f"1/({quantity.unit})" if " " in quantity.unit or "/" in quantity.unit else f"1/{quantity.unit}"

@@ -77,7 +77,8 @@ def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Conve
         column = f"{angles or foot.upper() + 'AnkleAngles'}.x"
         angle = AngleMap(terms=(column,), positive="dorsiflexion", unit="deg")
     # The measured loads, each in the unit that its magnitude shows. Without the axis upwards there is no force.
-    loads, on_loads = dict[str, Any](), list[tuple[str, str]]()
+    loads = dict[str, Any]()
+    on_loads = list[tuple[str, str]]()
     moment = _label(labels, foot + _MOMENTS)
     if moment is not None and _is_measured(table, f"{moment}.x"):
         unit, said = load_unit(table, f"{moment}.x", "moment", body_mass)

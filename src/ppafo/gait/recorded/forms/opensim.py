@@ -71,7 +71,8 @@ def read_opensim(path: str | Path) -> MotionTable:
             raise DataError(f"line {at + 1}: the first column must be '{TIME}', not {first!r}")
         if "" in labels:
             raise DataError(f"line {at + 1}: column {labels.index('') + 1} has no name")
-        rows, remarks = "\n".join(lines[at + 1 :]).rstrip().split("\n"), list[str]()
+        rows = "\n".join(lines[at + 1 :]).rstrip().split("\n")
+        remarks = []
         if rows == [""]:
             raise DataError("has labels but no rows")
         empty = next((number for number, row in enumerate(rows, at + 2) if not row.strip()), None)
@@ -114,7 +115,9 @@ def _header(lines: Sequence[str]) -> tuple[dict[str, int], str, str, int]:
     end = next((index for index, line in enumerate(lines) if line.strip().lower() == END), None)
     if end is None:
         raise DataError(f"has no line '{END}': the header is cut off, or this is not a .mot or .sto file")
-    counts, angle, kind = dict[str, int](), "", ""
+    counts = {}
+    angle = ""
+    kind = ""
     for number, line in enumerate(map(str.strip, lines[:end]), start=1):
         if count := _COUNT.match(line):
             text = count[2]
