@@ -71,7 +71,8 @@ def load_scenario(
     583958 Pa absolute
     """
     # Vanes first: the code of walks is loaded for a walk only.
-    name, path = str(scenario), Path(scenario)
+    name = str(scenario)
+    path = Path(scenario)
     parameter_set = set_or_load(parameter_set)
     if name in of_vanes.list_scenarios():
         return of_vanes.load_scenario(name, overrides, parameter_set)
@@ -143,8 +144,10 @@ def reloaded(scenario: Scenario, more: Iterable[str]) -> Scenario:
 
     A Python object as its controller is kept.
     """
-    before, custom = of_vanes.request_again(scenario.origin), scenario.controller.custom
-    layout, later = _layout(before.document), read_overrides(more, ScenarioError)
+    before = of_vanes.request_again(scenario.origin)
+    custom = scenario.controller.custom
+    layout = _layout(before.document)
+    later = read_overrides(more, ScenarioError)
     every = over_layer(
         before.document, before.overrides, later, scenario.name, layout.content, scenario.device.valve_name
     )
@@ -175,7 +178,8 @@ def with_overrides(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
 
 def usage_text(scenario: Scenario) -> str:
     """Return the command that runs a scenario with its overrides, and the equivalent tables of a file."""
-    origin, command = scenario.origin, scenario.motion.motion_kind.command
+    origin = scenario.origin
+    command = scenario.motion.motion_kind.command
     words = plugin_words(str(origin.content))
     words += [word for override in origin.overrides for word in ("--set", override)]
     name = origin.file or scenario.name

@@ -97,7 +97,8 @@ def _found(plugin: str | Path) -> tuple[_Plugin, ...]:
 
 def _of_path(path: Path) -> _Plugin:
     """Return the plug-in of a file, with the names of enclosing packages."""
-    parts, folder = [path.stem], path.parent
+    parts = [path.stem]
+    folder = path.parent
     while (folder / _PACKAGE).is_file():
         parts.insert(0, folder.name)
         folder = folder.parent
@@ -106,7 +107,8 @@ def _of_path(path: Path) -> _Plugin:
 
 def _of_module(module: str) -> _Plugin:
     """Return the plug-in of a module name; from the working folder only if not installed."""
-    top, here = module.partition(".")[0], str(Path.cwd())
+    top = module.partition(".")[0]
+    here = str(Path.cwd())
     if _is_installed(top) or importlib.machinery.PathFinder.find_spec(top, [here]) is None:
         return _Plugin(module)
     return _Plugin(module, here)

@@ -56,8 +56,10 @@ class ProgressLine:
     """Progress display on a stream: an updated line in a terminal, else a new line every few seconds."""
 
     def __init__(self, stream: TextIO, clock: Callable[[], float] = time.monotonic) -> None:
-        self._stream, self._clock = stream, clock
-        self._written, self._last = -_BETWEEN_LINES, ("", False)
+        self._stream = stream
+        self._clock = clock
+        self._written = -_BETWEEN_LINES
+        self._last = ("", False)
         self._open = False
 
     def __call__(self, progress: Progress) -> None:
@@ -72,7 +74,8 @@ class ProgressLine:
         now = progress.activity, 0 < progress.total == progress.done
         if now != self._last or self._clock() - self._written >= _BETWEEN_LINES:
             self._stream.write(f"ppafo: {progress.line()}\n")
-            self._written, self._last = self._clock(), now
+            self._written = self._clock()
+            self._last = now
         self._stream.flush()
 
     def close(self) -> None:

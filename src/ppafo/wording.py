@@ -105,7 +105,8 @@ def nearest_name(name: str, allowed: Iterable[str], likeness: float = 0.6) -> st
 
     A text that resembles no allowed name by ``likeness`` may be one word of a name: its first, or any other.
     """
-    word, known = str(name), list(allowed)
+    word = str(name)
+    known = list(allowed)
     before, dot, last = word.rpartition(".")
     meant, conversion = _OF_DATA_SHEETS.get(_SPELT_OTHERWISE.get(last.lower(), last.lower()), ("", ""))
     if meant and f"{before}{dot}{meant}" in known:
@@ -163,7 +164,8 @@ def one_line(text: object) -> str:
 
 def reason(error: OSError | ValueError) -> str:
     """Return the reason of a failed file access as the end of a sentence, with the nearest name of an absent file."""
-    text, hint = error.strerror if isinstance(error, OSError) and error.strerror else one_line(error), ""
+    text = error.strerror if isinstance(error, OSError) and error.strerror else one_line(error)
+    hint = ""
     if isinstance(error, FileNotFoundError) and error.filename:
         absent = Path(error.filename)
         hint = nearest_name(absent.name, (file.name for file in absent.parent.glob(f"*{absent.suffix}")))

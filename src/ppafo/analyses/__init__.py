@@ -19,6 +19,7 @@ else:
             """Return what the module has under a name."""
             return getattr(import_module(self._module), name)
 
-    ask, np = _AtFirstUse("ppafo.analyses.asking"), _AtFirstUse("numpy")
+    ask = _AtFirstUse("ppafo.analyses.asking")
+    np = _AtFirstUse("numpy")
 
 __all__ = ["ask", "np"]

@@ -305,7 +305,8 @@ def _check_different_values(study: Study, scenarios: Mapping[tuple[str, str], Sc
             continue
         declared = (ask.value_at(path, each) for (_, name), each in scenarios.items() if study.varies(path, name))
         values = [value for value in declared if value is not None]
-        lowest, highest = min(values, default=0.0), max(values, default=0.0)
+        lowest = min(values, default=0.0)
+        highest = max(values, default=0.0)
         if highest - lowest > 1.0e-9 * max(abs(lowest), abs(highest)):
             varied = ask.varied_path(path, next(iter(scenarios.values())))
             raise StudyError(
@@ -416,9 +417,12 @@ def compare_pairs(
     first draws, repeated with other noise. ``better`` is -1 if a smaller value is better, 1 if a larger value is
     better, 0 if neither. A draw with equal values counts for neither configuration.
     """
-    all_runs, baseline, other = other - baseline, baseline[:draws], other[:draws]
+    all_runs = other - baseline
+    baseline = baseline[:draws]
+    other = other[:draws]
     both = np.isfinite(baseline) & np.isfinite(other)
-    baseline_values, other_values = baseline[both], other[both]
+    baseline_values = baseline[both]
+    other_values = other[both]
     if baseline_values.size == 0:
         return None
     # Relative to the size of the baseline, so that the sign is the difference's; a baseline of 0 has no fractions.
@@ -453,7 +457,9 @@ def best_probabilities(values: Sequence[ask.Floats], better: int, confidence: fl
 
 def _remarks(found: ComparisonResult) -> list[str]:
     """Return remarks on differing tasks, failed runs, means that depend on few draws, and noise."""
-    remarks, failed, uncertain = [], [], []
+    remarks = []
+    failed = []
+    uncertain = []
     for task, cases in found.tasks.items():
         followed = {case.configuration: (case.scenario.reference, case.scenario.run.duration) for case in cases}
         # Compared by reference and duration and not by file: two configurations may name one task differently.
@@ -497,7 +503,8 @@ def _finding(found: ComparisonResult, check: bool, overrides: Sequence[str]) -> 
 
     Panels are made by functions with a name, since a lambda in a report cannot be pickled.
     """
-    names, cases = found.configurations, [case for of_task in found.tasks.values() for case in of_task]
+    names = found.configurations
+    cases = [case for of_task in found.tasks.values() for case in of_task]
     lead = f"{len(names)} configurations on {count_of(len(found.tasks), 'task')}, baseline {found.baseline}; "
     if not found.draws:
         lead += "the nominal device, without uncertainty"
@@ -544,7 +551,8 @@ def _finding(found: ComparisonResult, check: bool, overrides: Sequence[str]) -> 
 
 def _tables(found: ComparisonResult, task: str) -> list[ask.Section]:
     """Return the tables of a task: metrics, changes against the baseline, probability of being the best."""
-    cases, where = found.tasks[task], "" if len(found.tasks) == 1 else f", {task}"
+    cases = found.tasks[task]
+    where = "" if len(found.tasks) == 1 else f", {task}"
     # A column without any number, such as the error of a hold that no task has, says nothing.
     held = (name for name in found.metrics if not all(math.isnan(case.value(name)) for case in cases))
     kinds = {name: ask.of_metric(name) for name in held}
@@ -591,7 +599,9 @@ def _paired(found: ComparisonResult, cases: Sequence[ComparedCase], case: Compar
     base = next(each for each in cases if each.configuration == found.baseline)
     rows = []
     for metric, pair in case.pairs.items():
-        kind, low, high = ask.of_metric(metric, "+.3g"), _percent(pair.change_low), _percent(pair.change_high)
+        kind = ask.of_metric(metric, "+.3g")
+        low = _percent(pair.change_low)
+        high = _percent(pair.change_high)
         # A value that is zero within the accuracy of a run has no percentage.
         scale = abs(kind.shown_change(base.value(metric)))
         away = kind.shown_change(case.value(metric) - base.value(metric))
@@ -604,7 +614,8 @@ def _paired(found: ComparisonResult, cases: Sequence[ComparedCase], case: Compar
             kind.change_interval(pair.difference),
             "equal in all" if pair.better is not None and pair.equal == 1.0 else better,
         )
-        share, noise = pair.noise, "-"
+        share = pair.noise
+        noise = "-"
         if share is not None:
             noise = f"{100.0 * share.value:.3g} % [{100.0 * share.low:.3g}, {100.0 * share.high:.3g}]"
         rows.append((*row, noise) if found.has_noise else row)
@@ -628,9 +639,12 @@ def _front_panels(found: ComparisonResult) -> list[ask.Panel]:
     """Return a panel for each task of error over gas: a mark for each completed case, a dot for each draw."""
     panels = []
     for task, cases in found.tasks.items():
-        colours, marks, completed = _colours(cases), [], [case for case in cases if case.status.is_completed]
+        colours = _colours(cases)
+        marks = []
+        completed = [case for case in cases if case.status.is_completed]
         for number, case in enumerate(completed):
-            colour, marker = colours[case.configuration], "osD^vP"[number % 6]
+            colour = colours[case.configuration]
+            marker = "osD^vP"[number % 6]
             if case.rows:
                 gas, error = (case.rows[name][:1500] for name in (_GAS, found.error))
                 marks.append(ask.dots(gas, error, ".", "", colour, alpha=0.35, markersize=4, markeredgewidth=0))
@@ -649,7 +663,8 @@ def _change_panels(found: ComparisonResult) -> list[ask.Panel]:
     """Return panels with histograms of the change of error and gas against the baseline; dashed: nominal device."""
     panels = []
     for (task, cases), metric in product(found.tasks.items(), (found.error, _GAS)):
-        colours, base = _colours(cases), next(case for case in cases if case.configuration == found.baseline)
+        colours = _colours(cases)
+        base = next(case for case in cases if case.configuration == found.baseline)
         marks = []
         ends = list[float]()
         for case in cases:
@@ -683,11 +698,13 @@ def _limit_changes(ends: Sequence[float], axes: Any) -> None:
     from matplotlib.ticker import MaxNLocator
 
     # Far from all changes zero would squeeze them into a few pixels.
-    low, high = min(ends), max(ends)
+    low = min(ends)
+    high = max(ends)
     span = high - low or 1.0
     if low - 0.5 * span <= 0.0 <= high + 0.5 * span:
         axes.axvline(0.0, color=ask.BLACK, linewidth=0.8)
-        low, high = min(low, 0.0), max(high, 0.0)
+        low = min(low, 0.0)
+        high = max(high, 0.0)
     axes.set_xlim(low - 0.08 * span, high + 0.08 * span)
     # Of more intervals, labels such as -98.85 would touch.
     axes.xaxis.set_major_locator(MaxNLocator(4))

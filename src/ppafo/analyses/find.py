@@ -138,10 +138,12 @@ def find(
         is_met = rows["is_met"]
         remarks = []
         if not np.isfinite(rows["judged"]).any():
-            ends, why = f"from {path.quote(low)} to {path.quote(high)}", runs.reason and f"the first: {runs.reason}"
+            ends = f"from {path.quote(low)} to {path.quote(high)}"
+            why = runs.reason and f"the first: {runs.reason}"
             fault = f"no run {ends} gives the metric '{limit.metric}'"
             if rows["oscillating"].any():
-                fault, why = f"the loop oscillates in every run {ends}", _verdict(base, path, low, has_remedy=True)
+                fault = f"the loop oscillates in every run {ends}"
+                why = _verdict(base, path, low, has_remedy=True)
             raise StudyError("; ".join(filter(None, (f"scenario '{base.name}': {fault}", why))))
         row = index
         if row is None:
@@ -188,7 +190,8 @@ def find(
 
 def _range(text: str, base: Scenario) -> tuple[ask.VariedPath, float, float]:
     """Return path, lower and upper bound [SI] of a text ``PATH=LOW..HIGH``; StudyError for any other text."""
-    quoted, parts = f"'{one_line(text)}'", re.fullmatch(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*", text)
+    quoted = f"'{one_line(text)}'"
+    parts = re.fullmatch(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*", text)
     if parts is None:
         raise StudyError(f"{quoted} is not of the form PATH=LOW..HIGH, for example 'supply.pressure=20..90 psi_g'")
     name, lower, upper = parts.groups()
@@ -201,7 +204,8 @@ def _range(text: str, base: Scenario) -> tuple[ask.VariedPath, float, float]:
         # As in '20..90 psi_g': the low end has the unit of the high one unless it says its own.
         if not ask.split_quantity(lower)[1]:
             lower = f"{lower} {ask.split_quantity(upper)[1]}".rstrip()
-        low, high = path.level(lower), path.level(upper)
+        low = path.level(lower)
+        high = path.level(upper)
     if low >= high:
         raise StudyError(f"{quoted}: the lower end must be below the upper end")
     return path, low, high
@@ -212,7 +216,8 @@ def _limit(text: str, base: Scenario, path: str) -> ask.MetricLimit:
 
     Gauge pressures refer to the ambient pressure of the scenario, unless ``path``, the varied number, is this pressure.
     """
-    quoted, parts = f"'{one_line(text)}'", re.fullmatch(r"\s*([\w.:]+)\s*(<=|>=)\s*(.+?)\s*", text)
+    quoted = f"'{one_line(text)}'"
+    parts = re.fullmatch(r"\s*([\w.:]+)\s*(<=|>=)\s*(.+?)\s*", text)
     if text.strip() == ask.FOLLOWS:
         # Every value that is found follows its reference; of two that do not, the error says which is nearer.
         tracked = (f"rms_{base.controlled}_error", "rms_error", "torque_error", "peak_torque")
@@ -279,8 +284,10 @@ def judged(runs: ask.Rows, limit: ask.MetricLimit, streams: int) -> ask.Rows:
         return runs.reshape(streams, -1)
 
     # Nobody would build on a loop whose command turns all the time.
-    metric, settled = runs[limit.metric], runs[f"judged_{limit.metric}"]
-    oscillates, on_purpose = runs["oscillates"] == 1.0, runs[ask.ON_PURPOSE]
+    metric = runs[limit.metric]
+    settled = runs[f"judged_{limit.metric}"]
+    oscillates = runs["oscillates"] == 1.0
+    on_purpose = runs[ask.ON_PURPOSE]
     follows = by_value(runs[ask.FOLLOWS] == 1.0).all(axis=0)
     is_missed = by_value((runs[ask.FOLLOWS] == 0.0) & ~on_purpose).any(axis=0)
     number = by_value(np.where(oscillates, np.nan, settled)).mean(axis=0)
@@ -320,15 +327,21 @@ def _finding(found: Threshold, rows: ask.Rows, row: int, kind: ask.Kind, base: S
 
     ``row`` is that of the value found, or of the nearest one.
     """
-    values, of_limit, is_verdict = rows["value"], ask.of_metric(found.metric), found.condition == ask.FOLLOWS
+    values = rows["value"]
+    of_limit = ask.of_metric(found.metric)
+    is_verdict = found.condition == ask.FOLLOWS
     # Values that meet the condition although the run does not follow its reference.
     missed = 0 if is_verdict else int(np.count_nonzero(rows["is_missed"] & rows["is_kept"]))
     meets = "lets the run follow its reference" if is_verdict else f"meets {found.condition}"
     meets += " and follows its reference" * bool(missed)
-    name, number = found.metric, float(rows["metric"][row])
+    name = found.metric
+    number = float(rows["metric"][row])
     if rows["judged"][row] > number:
-        name, number = _SETTLED, float(rows["judged"][row])
-    used, remarks, there = "", [*found.remarks], "" if is_verdict else f"{name} of {of_limit.text(number)} at "
+        name = _SETTLED
+        number = float(rows["judged"][row])
+    used = ""
+    remarks = [*found.remarks]
+    there = "" if is_verdict else f"{name} of {of_limit.text(number)} at "
     if found.value is None:
         # The nearest one says whether a wider range could.
         ends = f"from {kind.text(values[0])} to {kind.text(values[-1])}"
@@ -362,7 +375,8 @@ def _finding(found: Threshold, rows: ask.Rows, row: int, kind: ask.Kind, base: S
     if on_purpose := int(np.count_nonzero(rows[ask.ON_PURPOSE] & rows["is_met"])):
         remarks.append(f"at {on_purpose} values the condition is met, with a reference beyond reach on purpose")
     # Ends of intervals that are values of the grid are not bracketed as the value found is.
-    grid, met = values[rows["is_of_grid"]], f"the condition is met{' and the reference followed' * bool(missed)}"
+    grid = values[rows["is_of_grid"]]
+    met = f"the condition is met{' and the reference followed' * bool(missed)}"
     exact = (values[0], values[-1], found.value)
     inner = ", ".join(kind.number(end) for interval in found.met for end in interval if end not in exact)
     beyond = f"of the grid; the condition may be met up to {kind.change(grid[1] - grid[0])} beyond"
@@ -394,12 +408,18 @@ def _finding(found: Threshold, rows: ask.Rows, row: int, kind: ask.Kind, base: S
 
 def _panel(found: Threshold, rows: ask.Rows, kind: ask.Kind, of_limit: ask.Kind, met: str) -> ask.Panel:
     """Return a panel of the metric over the value, with the limit, the values that meet it, and the result."""
-    values, metric, number, limit = rows["value"], rows["metric"], rows["judged"], found.limit
+    values = rows["value"]
+    metric = rows["metric"]
+    number = rows["judged"]
+    limit = found.limit
     if found.condition == ask.FOLLOWS:
         # The excess decides whether a run follows; it has no larger number beside it.
         metric = number = rows["excess"]
-        of_limit, limit = ask.Kind("Largest tracking number over its limit"), 1.0
-    of_grid, is_met, marks = rows["is_of_grid"], rows["is_met"], [ask.Mark("line", values, metric)]
+        of_limit = ask.Kind("Largest tracking number over its limit")
+        limit = 1.0
+    of_grid = rows["is_of_grid"]
+    is_met = rows["is_met"]
+    marks = [ask.Mark("line", values, metric)]
     for which, numbers, marker, label, colour, style in (
         (of_grid & is_met, metric, "o", "", ask.BLUE, {}),
         (of_grid & ~is_met, metric, "o", "", ask.BLUE, {"markerfacecolor": "white"}),

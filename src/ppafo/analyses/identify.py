@@ -199,8 +199,10 @@ def identify(
     from ppafo.parameters.parameter_set import atmospheric_pressure
 
     path = Path(problem)
-    asked, file = load_problem(path), path.name
-    device, tolerances = asked.device, asked.bench or DEFAULTS
+    asked = load_problem(path)
+    file = path.name
+    device = asked.device
+    tolerances = asked.bench or DEFAULTS
     beside = path.parent / device.set
     base = load_parameter_set(beside if beside.suffix == ".toml" else device.set)
     overrides = read_overrides(device.overrides)
@@ -219,7 +221,8 @@ def identify(
         trajectory = None
         if asked.trajectory is not None:
             context = BenchContext(current, device.valve, f"{file}: trajectory", tolerances)
-            reader, known = reader._replace(parameter_set=current), {item.path: item for item in estimates}
+            reader = reader._replace(parameter_set=current)
+            known = {item.path: item for item in estimates}
             trajectory = _solve_section(asked.trajectory, context, reader, known, used, progress)
             estimates += trajectory.estimates
         new_set = with_estimates(before, estimates, device.valve)
@@ -238,7 +241,8 @@ def _compared(
     from ppafo.identification.estimate import interval_factor, shown_text
     from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 
-    compared, declared = [*results], parameter_set.declarations()
+    compared = [*results]
+    declared = parameter_set.declarations()
     pairs = [
         (first, second, one, two)
         for first, second in combinations(range(len(results)), 2)
@@ -351,7 +355,8 @@ def _described(identification: Identification, problem: ProblemFile) -> NewSet:
     from ppafo.parameters.audit import findings_of
     from ppafo.parameters.loading import list_sets
 
-    old, new = identification.new_set.parameter_set, identification.new_set
+    old = identification.new_set.parameter_set
+    new = identification.new_set
     named = [name for procedure in problem.procedure for name in procedure.recordings]
     if problem.trajectory is not None:
         named += [experiment.recording for experiment in problem.trajectory.experiments]
@@ -396,7 +401,9 @@ def finding_of(identification: Identification) -> Finding[Identification]:
     from ppafo.identification.bench.law import bench_figure
     from ppafo.parameters.loading import parameter_set_toml
 
-    name, new_set, before = identification.name, identification.new_set, identification.before
+    name = identification.name
+    new_set = identification.new_set
+    before = identification.before
     parts = []
     figures = []
     counts = dict[str, int]()
@@ -414,12 +421,15 @@ def finding_of(identification: Identification) -> Finding[Identification]:
         ]
         parts.append(_part(fit, before, fit.known, more))
         for measured, model in zip(fit.measurements, fit.models, strict=True):
-            panels, shape = partial(trajectory_panels, measured, model), (measured.label, (5.4, 1.9))
-            stem, caption = f"trajectory-fit-{measured.label}", f"{measured.label} and the fit."
+            panels = partial(trajectory_panels, measured, model)
+            shape = (measured.label, (5.4, 1.9))
+            stem = f"trajectory-fit-{measured.label}"
+            caption = f"{measured.label} and the fit."
             figures.append(
                 ask.Section(name=stem, caption=caption, is_detail=True, panels=panels, title=shape[0], size=shape[1])
             )
-    written, fitted = new_set.written, new_set.fitted
+    written = new_set.written
+    fitted = new_set.fitted
     # A value that holds for this model only is in the set as well, and is never counted as identified.
     # Other numbers may be identified too, such as the zero of a scale, for which a set has no place.
     count = "no value of the set identified" if fitted else "not written, since no value was identified"
@@ -470,7 +480,8 @@ def _part(
         shown = f"{text} {numbers[0][1]}".removesuffix(" -").rstrip()
         rows.append((item.path, shown, " to ".join(ends), item.verdict_text))
         # A value far from that of the set is right for another device, or a wrong unit; openings have none.
-        entry, usual = before.numbers.get(item.path), number_in_si(before, item.path) or 0.0
+        entry = before.numbers.get(item.path)
+        usual = number_in_si(before, item.path) or 0.0
         if entry is None or not item.is_usable or ".opening." in item.path or not (usual > 0.0 and item.value > 0.0):
             continue
         if not 1.0 / _FAR_FROM_SET < (ratio := item.value / usual) < _FAR_FROM_SET:

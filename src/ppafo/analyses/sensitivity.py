@@ -175,7 +175,8 @@ def _sobol_design(uncertainty: ask.Uncertainty, blocks: int, seed: int) -> Float
         raise StudyError(f"samples = {blocks}: Sobol indices need a power of 2, for example {1 << blocks.bit_length()}")
     from scipy.stats import qmc
 
-    dimensions, points_of_scramble = len(uncertainty.drawn), blocks // SCRAMBLES
+    dimensions = len(uncertainty.drawn)
+    points_of_scramble = blocks // SCRAMBLES
     design = np.empty((points_of_scramble, SCRAMBLES, dimensions + 2, dimensions))
     exchanged = np.arange(dimensions)
     for number in range(SCRAMBLES):
@@ -202,7 +203,9 @@ def _sobol_indices(
     def total_and_first(table: Floats) -> Floats:
         # Centred: the estimate of the first order is a mean of products, whose error grows with the mean of the metric.
         table = table - np.mean(table[:, [0, -1]])
-        first, copies, second = table[:, :1], table[:, 1:-1], table[:, -1:]
+        first = table[:, :1]
+        copies = table[:, 1:-1]
+        second = table[:, -1:]
         variance = float(np.mean(table[:, [0, -1]] ** 2))
         total = 0.5 * np.mean((first - copies) ** 2, axis=0)
         return np.stack([total, np.mean(second * (copies - first), axis=0)]) / (variance or math.nan)
@@ -210,7 +213,8 @@ def _sobol_indices(
     # Points of one scramble depend on each other, scrambles do not: those are left out in turn.
     scramble = blocks % SCRAMBLES
     left_out = np.array([total_and_first(table[scramble != number]) for number in np.unique(scramble)])
-    values, reach = total_and_first(table), ask.jackknife_reach(left_out, confidence)
+    values = total_and_first(table)
+    reach = ask.jackknife_reach(left_out, confidence)
     return {"total": values[0], "first": values[1]}, {"total": reach[0], "first": reach[1]}
 
 
@@ -231,7 +235,8 @@ def _shapley_design(uncertainty: ask.Uncertainty, blocks: int, seed: int) -> Flo
 
     count = len(uncertainty.drawn)
     lower = np.eye(count) if uncertainty.scores is None else np.asarray(uncertainty.scores)
-    covariance, random = lower @ lower.T, np.random.default_rng([seed, 1])
+    covariance = lower @ lower.T
+    random = np.random.default_rng([seed, 1])
     scores = random.standard_normal((blocks, count - 1, 1, count)) @ lower.T
     scores = np.repeat(scores, _INNER, axis=2)
     fresh = random.standard_normal((blocks, count - 1, _INNER, count))
@@ -258,7 +263,8 @@ def _shapley_indices(
     """Return the index ``shapley`` with bands by the delta method over the orders."""
     from scipy.special import stdtrit
 
-    count, table = blocks.size, table.reshape(blocks.size, paths - 1, _INNER)
+    count = blocks.size
+    table = table.reshape(blocks.size, paths - 1, _INNER)
     variances = np.mean((table - np.mean(table)) ** 2, axis=(1, 2))
     conditional = np.var(table, axis=2, ddof=1)
     gains = np.diff(np.concatenate([np.zeros((count, 1)), conditional, variances[:, None]], axis=1), axis=1)
@@ -318,7 +324,8 @@ def _levels(values: Floats, inputs: Floats, end: float, part: NDArray[np.intp], 
 
     ``nearest`` is the fraction of the runs, nearest to the end, to which the parabola is fitted.
     """
-    distance, count = np.abs(inputs - end), int(part.max()) + 1
+    distance = np.abs(inputs - end)
+    count = int(part.max()) + 1
     rank = int(nearest * distance.size)
     near = distance <= np.partition(distance, rank)[rank]
     scaled = (inputs[near] - end) / (np.max(distance[near]) or 1.0)
@@ -326,7 +333,8 @@ def _levels(values: Floats, inputs: Floats, end: float, part: NDArray[np.intp], 
     moments = np.stack([np.bincount(part[near], power, count) for power in powers])
     mixed = np.stack([np.bincount(part[near], power * values[near], count) for power in powers[:3]])
     # All parts, and all but one in turn.
-    total, mixed_total = np.sum(moments, axis=1, keepdims=True), np.sum(mixed, axis=1, keepdims=True)
+    total = np.sum(moments, axis=1, keepdims=True)
+    mixed_total = np.sum(mixed, axis=1, keepdims=True)
     moments = np.concatenate([total, total - moments], axis=1)
     mixed = np.concatenate([mixed_total, mixed_total - mixed], axis=1)
     # A value of one or two levels needs no parabola: the pseudo-inverse leaves at 0 what they do not tell.
@@ -551,7 +559,8 @@ def _part(found: Influences, metric: MetricSensitivity) -> ask.Section:
     if unsettled:
         remarks.append(f"not converged at this sample size, confidence bands overlap: {', '.join(unsettled)}")
     if "first" in indices.values:
-        alone, error = float(np.sum(indices.values["first"])), float(np.linalg.norm(indices.bands["first"]))
+        alone = float(np.sum(indices.values["first"]))
+        error = float(np.linalg.norm(indices.bands["first"]))
         rest = "; the rest comes from interactions"
         rest = rest if alone + error < 1.0 else ": interactions, if any, are within this error"
         remarks.append(f"first-order indices sum to {alone:.3f} ± {error:.2g}{rest}")
@@ -582,7 +591,8 @@ def _panels(found: Influences) -> list[ask.Panel]:
         indices = metric.indices
         bars = []
         courses = []
-        name, sizes = next(iter(indices.values)), [step.blocks for step in metric.settling]
+        name = next(iter(indices.values))
+        sizes = [step.blocks for step in metric.settling]
         order = np.argsort(-indices.values[name])
         colours = [ask.COLOURS[rank] if rank < _MAXIMUM_LINES else ask.GREY for rank in range(order.size)]
         places = np.arange(order.size)[::-1]
@@ -602,7 +612,8 @@ def _panels(found: Influences) -> list[ask.Panel]:
             courses.append(ask.Mark("line", sizes, values, colour=colour, style=line))
             courses.append(ask.Mark("band", sizes, np.stack([values - bands, values + bands]), colour=colour))
         named = partial(name_values, places=places, labels=[ask.label_of(found.paths[row]) for row in order])
-        words, title = ask.of_metric(metric.metric).words, f"{_TITLES[name].capitalize()}, {len(courses) // 2} largest"
+        words = ask.of_metric(metric.metric).words
+        title = f"{_TITLES[name].capitalize()}, {len(courses) // 2} largest"
         axis = ask.Kind(found.noun.capitalize())
         panels.append(
             ask.Panel(ask.Kind("Fraction of the variance"), ask.Kind(), bars, words, legend="figure", then=named)

@@ -112,7 +112,8 @@ class StudyResults:
         Channels over time are not part of the table; ``trajectories`` returns them.
         """
         # All chunks have the columns of the first.
-        known, traces = next(self.chunks()).column_names, {trace_column(name) for name in CHANNELS}
+        known = next(self.chunks()).column_names
+        traces = {trace_column(name) for name in CHANNELS}
         for name in columns or ():
             if name not in known:
                 raise StudyError(f"the study has no column '{name}'{known_names(name, known)}")
@@ -225,7 +226,8 @@ def summarise(study: Study, results: StudyResults) -> StudyResults:
     """
     names = results.configurations
     failures = list[dict[str, Any]]()
-    completed, known = dict.fromkeys(names, 0), results.known
+    completed = dict.fromkeys(names, 0)
+    known = results.known
     for name in names:
         for part in results.chunks(["run", "configuration", "status", "reason"], name):
             rows = np.asarray(part.column("status").to_numpy() == STATUSES[0])
@@ -233,7 +235,8 @@ def summarise(study: Study, results: StudyResults) -> StudyResults:
             if len(failures) < _EXAMPLES and not rows.all():
                 failures += part.filter(~rows).slice(0, _EXAMPLES - len(failures)).to_pylist()
     # A run that diverged has a time at which it did; one that was refused never began.
-    failed, diverged = study.runs - sum(completed.values()), sum(known(name, "failure_time").size for name in names)
+    failed = study.runs - sum(completed.values())
+    diverged = sum(known(name, "failure_time").size for name in names)
     tracking = {name: results.tracking(name, completed[name]) for name in names}
     summary: dict[str, Any] = {
         "study": study.name,
@@ -309,7 +312,8 @@ def _bands_file(study: Study, results: StudyResults) -> bytes:
                 parts.append(
                     {**places, **times, **dict(zip(map("q{:g}".format, outputs.quantiles), levels, strict=True))}
                 )
-    rows, units = joined(parts), {stored_unit(CHANNELS[name].unit) for name in outputs.bands}
+    rows = joined(parts)
+    units = {stored_unit(CHANNELS[name].unit) for name in outputs.bands}
     unit = units.pop() if len(units) == 1 else "SI unit of the channel"
     rows["configuration"] = encode_texts(rows["configuration"], results.configurations)
     rows["channel"] = encode_texts(rows["channel"], outputs.bands)
@@ -326,16 +330,21 @@ def _bands_file(study: Study, results: StudyResults) -> bytes:
 def sorted_quantiles(ordered: ask.Floats, counts: NDArray[np.int64], fractions: Sequence[float]) -> ask.Floats:
     """Return quantiles (fractions, columns) of the first ``counts`` values of sorted columns; nan for empty ones."""
     places = np.maximum(counts - 1, 0) * np.asarray(fractions)[:, None]
-    low, columns = places.astype(np.int64), np.arange(counts.size)
-    below, above = ordered[low, columns], ordered[np.minimum(low + 1, np.maximum(counts - 1, 0)), columns]
+    low = places.astype(np.int64)
+    columns = np.arange(counts.size)
+    below = ordered[low, columns]
+    above = ordered[np.minimum(low + 1, np.maximum(counts - 1, 0)), columns]
     return np.asarray(below + (places - low) * (above - below), dtype=np.float64)
 
 
 @in_units(lambda results: results.document["shown"])
 def finding_of(results: StudyResults) -> ask.Finding[StudyResults]:
     """Return the results of a study as a finding; passed if enough runs of each configuration completed."""
-    document, summary, study = results.document, results.summary, results.document["study"]
-    runs, completed = document["runs"] // len(results.configurations), summary["completed_by_configuration"]
+    document = results.document
+    summary = results.summary
+    study = results.document["study"]
+    runs = document["runs"] // len(results.configurations)
+    completed = summary["completed_by_configuration"]
     ended = ", ".join(f"{summary[key]:,} {key}" for key in STATUSES if summary[key])
     said = [f"{results.name}: {document['runs']:,} runs: {ended}"]
     failures = [f"run {each['run']} ({each['configuration']}): {each['reason']}" for each in summary["failures"]]
@@ -360,7 +369,8 @@ def finding_of(results: StudyResults) -> ask.Finding[StudyResults]:
         for pair in study.get("correlations", ())
     ]
     if sample := study.get("sample"):
-        method, seed = sample["method"].replace("_", " "), sample.get("seed", ask.DEFAULT_SEED)
+        method = sample["method"].replace("_", " ")
+        seed = sample.get("seed", ask.DEFAULT_SEED)
         sampling.append(f"Sampled by {method}: {sample['runs']} draws, seed {seed}.")
     assumed: dict[tuple[str, str, str], list[str]] = {}
     for name, scenario in document["scenarios"].items():
@@ -388,7 +398,8 @@ def finding_of(results: StudyResults) -> ask.Finding[StudyResults]:
 
 def _tracking_texts(results: StudyResults) -> list[str]:
     """Return how many runs of each configuration with a reference follow it, do not, or are beyond reach on purpose."""
-    summary, completed = results.summary, results.summary["completed_by_configuration"]
+    summary = results.summary
+    completed = results.summary["completed_by_configuration"]
     # Folders of earlier versions name these configurations elsewhere.
     judged = summary["tracking"] if "tracking" in summary else summary["without_verdict"]
     return [f"{name}: {results.tracking(name, completed[name]).sentence}" for name in judged]
@@ -399,9 +410,11 @@ def _metrics(results: StudyResults, name: str) -> ask.Section:
     described = [each for own in results.metrics.values() for each in own.values() if each["count"]]
     fractions = list(described[0]["quantiles"]) if described else []
     head = ("metric", "unit", "runs", "mean", "sd", *(f"{100 * float(fraction):g} %" for fraction in fractions))
-    kinds, rows = _kinds(results), []
+    kinds = _kinds(results)
+    rows = []
     for metric, own in results.metrics[name].items():
-        kind, cells = kinds[metric], [""] * (len(head) - 3)
+        kind = kinds[metric]
+        cells = [""] * (len(head) - 3)
         if own["count"]:
             deviation = kind.change_number(own["sd"]) if "sd" in own else ""
             cells = [kind.number(own["mean"]), deviation, *map(kind.number, own["quantiles"].values())]
@@ -412,7 +425,8 @@ def _metrics(results: StudyResults, name: str) -> ask.Section:
 
 def _kinds(results: StudyResults) -> dict[str, ask.Kind]:
     """Return the kinds of varied paths and metrics from their stored units, also of a metric that no longer exists."""
-    varied, metrics = results.document["varied"].items(), results.document["metrics"].items()
+    varied = results.document["varied"].items()
+    metrics = results.document["metrics"].items()
     return {
         # A column of every study, not a requested metric.
         FOLLOWS: ask.Kind(f"Follows its reference{YES_OR_NO}"),
@@ -426,7 +440,9 @@ def _figure(results: StudyResults) -> ask.Section:
 
     A grid of two axes is drawn as maps, two drawn values as coloured points, all else as one panel for each metric.
     """
-    study, names, kinds = results.document["study"], results.configurations[: len(COLOURS)], _kinds(results)
+    study = results.document["study"]
+    names = results.configurations[: len(COLOURS)]
+    kinds = _kinds(results)
     described = {
         metric: [own[metric] for own in results.metrics.values() if own[metric]["count"]]
         for metric in results.document["metrics"]
@@ -479,7 +495,8 @@ def _panels(
     kinds = _kinds(results)
     panels = []
     for metric in metrics:
-        kind, values = kinds[metric], results.by_configuration(metric)
+        kind = kinds[metric]
+        values = results.by_configuration(metric)
         if len(grid) == 2:
             panels += [_map(results, grid, values[name], name, kinds, kind) for name in names]
         elif len(varied) == 2:
@@ -490,12 +507,14 @@ def _panels(
                 dots = ask.Mark("points", x, y, kind.values(values[name][::step]))
                 panels.append(ask.Panel(kinds[varied[0]], kinds[varied[1]], [dots], scale=kind))
         elif len(varied) == 1:
-            across, marks = results.by_configuration(varied[0]), []
+            across = results.by_configuration(varied[0])
+            marks = []
             for name, colour in zip(results.configurations, COLOURS, strict=False):
                 # Draws come in any order, a line goes from left to right.
                 order = np.argsort(across[name], kind="stable")
                 order = order[:: max(1, order.size // _MAXIMUM_POINTS)]
-                x, y = across[name][order], values[name][order]
+                x = across[name][order]
+                y = values[name][order]
                 marks.append(ask.Mark("line", x, y, label=name, colour=colour, style={"marker": "."}))
             panels.append(ask.Panel(kinds[varied[0]], kind, marks))
         else:
@@ -519,7 +538,8 @@ def _histogram(by_name: ask.Rows, kind: ask.Kind) -> ask.Panel:
     ticks = {}
     if high == low:
         # One bar about the only value.
-        edges, ticks = low + (abs(low) or 1.0) * np.array([-0.05, 0.05]), {"xticks": kind.values(np.array([low]))}
+        edges = low + (abs(low) or 1.0) * np.array([-0.05, 0.05])
+        ticks = {"xticks": kind.values(np.array([low]))}
     elif high - low < _HISTOGRAM_BINS and bool(np.all(values == np.round(values))):
         # A bin for each whole number where values are counts of few kinds: others would be empty now and then.
         edges = np.arange(low - 0.5, high + 1.0)
@@ -551,7 +571,9 @@ def _map(
         np.unique(results.by_configuration(path)[name], return_inverse=True) for path in grid
     )
     # A point of the grid may have several draws, some of which failed: the mean of the others.
-    cell, known, cells = row * columns.size + column, np.isfinite(values), rows.size * columns.size
+    cell = row * columns.size + column
+    known = np.isfinite(values)
+    cells = rows.size * columns.size
     count, total = (np.bincount(cell[known], weights, minlength=cells) for weights in (None, values[known]))
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(rows.size, columns.size)
     declared = {number["path"]: number for number in results.document["study"]["vary"]}

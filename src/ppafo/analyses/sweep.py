@@ -97,7 +97,8 @@ def sweep(
         varied = [path for path in {*chosen.paths, *chosen.same} if chosen.varies(path, configuration.name)]
         with said_of_configuration(configuration.name):
             warn_of_gains(configuration.scenario, varied)
-    report, started = progress or report_nothing, time.monotonic()
+    report = progress or report_nothing
+    started = time.monotonic()
     chunks, finished = claim(chosen, folder, agreed, threads, report)
     missing = [chunk for chunk in chunks if chunk.number not in finished]
     earlier = sum(chunk.runs for chunk in chunks) - sum(chunk.runs for chunk in missing)

@@ -321,17 +321,20 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
     """
     document, source = ask.read_source(TUNING, tuning)
     parsed = checked_record(TuningFile, document, source.file, StudyError, source.text)
-    robust, paths = parsed.robust, [gain.path for gain in parsed.search]
+    robust = parsed.robust
+    paths = [gain.path for gain in parsed.search]
     with refused_as(StudyError, source.file, ScenarioError, ParameterError, StudyError):
         scenario = ask.load_scenario(ask.placed(parsed.scenario, source.folder), parsed.overrides)
         scenario = ask.reloaded(scenario, overrides) if overrides else scenario
         metrics = [*(goal.metric for goal in parsed.objective), *(limit.metric for limit in parsed.constraints)]
         ask.check_metrics(list(dict.fromkeys(metrics)), scenario)
-        uncertainty, seed = ask.Uncertainty(()).with_noise_of([scenario]), parsed.effort.seed
+        uncertainty = ask.Uncertainty(()).with_noise_of([scenario])
+        seed = parsed.effort.seed
         if robust is not None:
             with refused_as(StudyError, "robust", StudyError):
                 study = ask.load_study(beside(robust.study, source.folder, ask.list_studies()))
-                uncertainty, seed = ask.uncertainty_of(study).with_noise_of([scenario]), study.sample.seed
+                uncertainty = ask.uncertainty_of(study).with_noise_of([scenario])
+                seed = study.sample.seed
                 if (path := next(iter(study.only), None)) is not None:
                     raise StudyError(f"'{path}' varies in some configurations only; choose a study without 'only'")
                 if (path := next((path for path in uncertainty.paths if path in paths), None)) is not None:
@@ -350,7 +353,8 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
                     raise StudyError(f"{where}: must be above 0")
         limits = []
         for constraint in parsed.constraints:
-            metric, where = constraint.metric, f"constraint '{constraint.metric}'"
+            metric = constraint.metric
+            where = f"constraint '{constraint.metric}'"
             bounds = [text for text in (constraint.at_most, constraint.at_least) if text is not None]
             if len(bounds) != 1:
                 has = "both" if bounds else "neither"
@@ -401,7 +405,9 @@ def solve_tuning(
     problem: Problem, threads: int | None, progress: Report | None, executor: Executor | None = None
 ) -> ask.Finding[Tuned]:
     """Solve a tuning problem: search for gains, and evaluation of the gains before and after."""
-    scenario, effort, uncertainty = problem.scenario, problem.effort, problem.uncertainty
+    scenario = problem.scenario
+    effort = problem.effort
+    uncertainty = problem.uncertainty
     report = progress or report_nothing
     # As many as are made if no start converges early: the first candidates are a generation of their own, the gains
     # before run for the scales and for their result, the gains found once, and both over fresh draws.
@@ -424,9 +430,11 @@ def solve_tuning(
         return {name: column.reshape(-1, count) for name, column in runs.run(columns).items()}
 
     # By default each goal is 1 before tuning: goals in different units then weigh as much as their weights say.
-    scales, first = dict(problem.scales), tried([problem.before], draws)
+    scales = dict(problem.scales)
+    first = tried([problem.before], draws)
     for goal in problem.goals:
-        name, is_high = goal.metric, goal.weight > 0.0
+        name = goal.metric
+        is_high = goal.weight > 0.0
         scale = scales.setdefault(name, abs(float(problem.bad_end(first[f"judged_{name}"], is_high)[0])))
         if not np.isfinite(scale) or scale == 0.0:
             raise StudyError(
@@ -480,7 +488,8 @@ def solve_tuning(
         fraction = gain.range.fraction(after.gains[gain.place.path])
         if not 0.01 < fraction < 1.0 - 0.01:
             bounds[gain.place.path] = "minimum" if fraction <= 0.01 else "maximum"
-    tracking, lines = ask.verdict_of(after.result), problem.lines(after.gains)
+    tracking = ask.verdict_of(after.result)
+    lines = problem.lines(after.gains)
     tuned = Tuned(
         tuning=problem.name,
         scenario=scenario.name,
@@ -512,7 +521,8 @@ def judge(rows: ask.Rows, problem: Problem, scales: Mapping[str, float]) -> ask.
     without_value = np.asarray(np.mean(rows["unusable"] | lacks_metric, axis=1))
     # Candidates with failed runs are ranked by how many fail: 0 keeps nan out of the sums meanwhile.
     known = {name: np.where(without_value[:, None] > 0.0, 0.0, values) for name, values in judged.items()}
-    objective, violation = np.zeros(without_value.size), np.zeros(without_value.size)
+    objective = np.zeros(without_value.size)
+    violation = np.zeros(without_value.size)
     for goal in problem.goals:
         objective += goal.weight * problem.bad_end(known[goal.metric], goal.weight > 0.0) / scales[goal.metric]
     for constraint in problem.constraints:
@@ -601,7 +611,8 @@ def search(
 
 def _is_settled(costs: ask.Floats) -> bool:
     """Return whether the costs of a generation have converged."""
-    least, most = np.min(costs), np.max(costs)
+    least = np.min(costs)
+    most = np.max(costs)
     if most >= UNUSABLE or least < INFEASIBLE <= most:
         return False
     # Where all break a constraint, what counts is by how much they break it.
@@ -691,10 +702,14 @@ def _remarks(
 @in_units(lambda tuned: tuned.problem.scenario.device.shown)
 def _finding(tuned: Tuned) -> ask.Finding[Tuned]:
     """Return the result of a tuning as a finding; it has passed if the gains satisfy all constraints."""
-    problem, before, after, scenario = tuned.problem, tuned.before, tuned.after, tuned.problem.scenario
+    problem = tuned.problem
+    before = tuned.before
+    after = tuned.after
+    scenario = tuned.problem.scenario
     rows = []
     for gain in problem.searched:
-        path, quote = gain.place.path, gain.place.quote
+        path = gain.place.path
+        quote = gain.place.quote
         end = f"at its {tuned.bounds_reached[path]}" if path in tuned.bounds_reached else ""
         rows.append((path, quote(gain.before), quote(after.gains[path]), gain.quote(0.0), gain.quote(1.0), end))
     sides: dict[str, Mapping[str, float]] = {"before": before.values, "after": after.values}
@@ -713,7 +728,8 @@ def _finding(tuned: Tuned) -> ask.Finding[Tuned]:
     limits = ([limit.words for limit in problem.constraints if limit.metric == name] for name in kinds)
     table.append(ask.Column("constraint", [", ".join(words) for words in limits]))
     # The scenario's file, or the name of one that comes with the package, finds it again.
-    name, command = scenario.origin.file or scenario.name, scenario.motion.motion_kind.command
+    name = scenario.origin.file or scenario.name
+    command = scenario.motion.motion_kind.command
     # Texts of TOML and of Python alike.
     used = ask.usage_text(ask.reloaded(scenario, tuned.lines))
     listed = ", ".join(json.dumps(line, ensure_ascii=False) for line in tuned.overrides)
@@ -755,9 +771,11 @@ def _finding(tuned: Tuned) -> ask.Finding[Tuned]:
 
 def _task_panels(tuned: Tuned) -> list[ask.Panel]:
     """Return panels of controlled quantity, command and gas over time, before and after, for the nominal device."""
-    before, after = tuned.before.result.recording, tuned.after.result.recording
+    before = tuned.before.result.recording
+    after = tuned.after.result.recording
     controlled = controlled_in(after) or CONTROLLED[TORQUE]
-    words, unit = controlled.words, controlled.level.unit
+    words = controlled.words
+    unit = controlled.level.unit
     kinds = {
         controlled.name: ask.Kind(words[:1].upper() + words[1:], unit, quantity_of_unit(unit)),
         "command": ask.Kind("Valve command"),
@@ -772,7 +790,8 @@ def _task_panels(tuned: Tuned) -> list[ask.Panel]:
             for own, colour, label, width in ((before, ask.VERMILION, "before", 1.8), (after, ask.BLUE, "after", 1.1))
         ]
         if channel == controlled.name and controlled.reference in after:
-            dashed, reference = {"linestyle": "--", "linewidth": 1.2}, after[controlled.reference]
+            dashed = {"linestyle": "--", "linewidth": 1.2}
+            reference = after[controlled.reference]
             marks.append(ask.Mark("line", after.time, reference, label="reference", colour=ask.BLACK, style=dashed))
         panels.append(ask.Panel(ask.TIME, kind, marks, legend="" if panels else "figure", shares_x=True))
     return panels
@@ -814,5 +833,6 @@ def _search_panels(tuned: Tuned) -> list[ask.Panel]:
     ranges = ask.Panel(ask.Kind("Between bounds"), ask.Kind(), marks, then=lambda axes: axes.set(**every))
     if not courses:
         return [ranges]
-    kinds, title = (ask.Kind("Generation"), ask.Kind()), "Objective, best so far"
+    kinds = (ask.Kind("Generation"), ask.Kind())
+    title = "Objective, best so far"
     return [ask.Panel(*kinds, [*courses, level], title, legend="inside", then=scale), ranges]

@@ -220,7 +220,9 @@ def verdict(validation: Validation) -> str:
     """Return a sentence on the agreement of the set, with the largest deviation and its probable cause, if any."""
     from ppafo.simulation.recorded.usual_errors import PRESSURE_ERRORS
 
-    causes, passes, recordings = validation.causes, validation.passes, validation.recordings
+    causes = validation.causes
+    passes = validation.passes
+    recordings = validation.recordings
     pairs = [(channel, agreement) for agreement in recordings for channel in agreement.channels]
     # The difference of two pressures is no channel of its own.
     worst, _ = max(pairs, key=lambda pair: (pair[0].channel in pair[1].measured, pair[0].in_noise))
@@ -261,7 +263,8 @@ def verdict(validation: Validation) -> str:
         if (delay := validation.device.valve.settings.get("delay")) is not None:
             said += f", of the sensors or of the valve (valve.delay = {1.0e3 * (delay + removed):.3g} ms)"
         texts.append(said)
-    explanation, name = "; ".join(texts), validation.device.name
+    explanation = "; ".join(texts)
+    name = validation.device.name
     if not passes:
         failed = ", ".join(
             f"{channel.channel} in {agreement.file} ({percentage(channel.fraction, 3)}, limit "
@@ -295,7 +298,8 @@ def _finding_of(validation: Validation) -> Finding[Validation]:
         f"{stem}-{1 + stems[:index].count(stem)}" if stems.count(stem) > 1 else stem for index, stem in enumerate(stems)
     ]
     pairs = list(zip(names, validation.recordings, strict=True))
-    kinds, said = {agreement.measured.kind for _, agreement in pairs}, [verdict(validation)]
+    kinds = {agreement.measured.kind for _, agreement in pairs}
+    said = [verdict(validation)]
     # The verdict must not be read without these.
     if unmeasured := sorted(kinds - {"measured"}):
         said.append(
@@ -348,7 +352,8 @@ def _part(name: str, agreement: RecordingAgreement) -> ask.Section:
         end = bias, largest, f"{channel.largest_time:.4g} s", "pass" if channel.passes else "FAIL"
         return channel.channel, rms, number(channel.in_noise), variation, *shares, *end
 
-    measured, kind = agreement.measured, KIND_WORDS[agreement.measured.kind]
+    measured = agreement.measured
+    kind = KIND_WORDS[agreement.measured.kind]
     delay = f"{1.0e3 * agreement.delay:.3g} ms" if agreement.delay else "none found"
     replayed = (
         f"{len(measured)} samples over {measured.duration:.4g} s; inputs from the recording: "
@@ -375,11 +380,13 @@ def _panels(agreement: RecordingAgreement, across: int) -> list[ask.Panel]:
     from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
     from ppafo.validation.settings import COMPARED, PRESSURE_1, PRESSURE_2
 
-    measured, looks = agreement.measured, {PRESSURE_1: CHAMBER_1, PRESSURE_2: CHAMBER_2}
+    measured = agreement.measured
+    looks = {PRESSURE_1: CHAMBER_1, PRESSURE_2: CHAMBER_2}
     time, scale = (ask.Kind("Time", "ms"), 1.0e3) if measured.duration < _SHORT else (ask.TIME, 1.0)
     pairs: list[list[ask.Panel]] = []
     for index, channel in enumerate(agreement.channels):
-        name, quantity = channel.channel, COMPARED[channel.channel]
+        name = channel.channel
+        quantity = COMPARED[channel.channel]
         limit = channel.limit * channel.full_range
         curve = FittedCurve(
             time=time,

@@ -123,7 +123,8 @@ class AcceptedValues(NamedTuple):
 
 def accepted_values(annotation: Any) -> AcceptedValues:
     """Return the accepted values of a parameter with an annotation."""
-    origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
+    origin = typing.get_origin(annotation)
+    inner = typing.get_args(annotation)
     if origin is Annotated:
         # Python flattens nested annotations with the outermost last: that one has priority.
         taking = [(item.what, item.take) for item in inner[1:] if isinstance(item, Word) and item.take]
@@ -208,7 +209,8 @@ def _scalar(value: Any) -> Any:
     a unit becomes the text of both, as a person writes it.
     """
     if (with_unit := carried(value)) is not None:
-        number, unit = _scalar(with_unit[0]), with_unit[1]
+        number = _scalar(with_unit[0])
+        unit = with_unit[1]
         is_number = isinstance(number, numbers.Real) and not isinstance(number, bool)
         return f"{float(number)!r} {unit}" if is_number and unit != "1" else number
     if getattr(value, "ndim", None) != 0 or not hasattr(value, "item"):
@@ -267,7 +269,8 @@ def taken_overrides(value: Any) -> tuple[str, ...]:
 
 def _overrides_of(table: Mapping[Any, Any], section: str) -> Iterator[str]:
     for name, value in table.items():
-        path, scalar = f"{section}{taken_text(name)}", _scalar(value)
+        path = f"{section}{taken_text(name)}"
+        scalar = _scalar(value)
         if isinstance(scalar, Mapping):
             yield from _overrides_of(scalar, f"{path}.")
         elif isinstance(scalar, bool):
@@ -385,7 +388,8 @@ def show_plainly(value: Any) -> None:
     if not inspect.isfunction(function):
         return
     hints = {name: _type_text(hint) for name, hint in _annotations(function, with_words=False).items()}
-    signature, parameters = inspect.signature(function), []
+    signature = inspect.signature(function)
+    parameters = []
     for name, item in signature.parameters.items():
         # A function, or the factory of a field, has no text of its own.
         has_text = item.default is item.empty or not repr(item.default).startswith("<")

@@ -134,7 +134,9 @@ def arguments_of(verb: _Verb) -> Iterator[_Argument]:
     for name, parameter in annotated_parameters(verb).items():
         if name in (PROGRESS, PLUGINS):
             continue
-        word, annotation, is_repeated = None, parameter.annotation, False
+        word = None
+        annotation = parameter.annotation
+        is_repeated = False
         while (origin := typing.get_origin(annotation)) not in (None, typing.Literal):
             inner = typing.get_args(annotation)
             if origin is Annotated:
@@ -185,7 +187,8 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
 def _helps_in(docstring: str, names: Collection[str]) -> dict[str, str]:
     """Return the help texts of the named parameters in a docstring, with indented continuations."""
     helps: dict[str, str] = {}
-    name, depth = "", 0
+    name = ""
+    depth = 0
     for line in docstring.splitlines():
         indent = len(line) - len(line.lstrip())
         # Only names of parameters: a sentence of the docstring may have a colon too.
@@ -193,7 +196,8 @@ def _helps_in(docstring: str, names: Collection[str]) -> dict[str, str]:
         if name and indent > depth:
             helps[name] += f" {line.strip()}"
         elif first_line is not None and first_line[1] in names:
-            name, depth = first_line[1], indent
+            name = first_line[1]
+            depth = indent
             helps[name] = first_line[2]
         else:
             name = ""
@@ -204,7 +208,9 @@ def _add_argument(
     parser: argparse.ArgumentParser, argument: _Argument, help_text: str, may_be_missing: bool, is_listing: bool
 ) -> None:
     """Add a positional argument or an option; ``run`` refuses a missing positional argument."""
-    name, option, is_required = argument.parameter.name, argument.option, argument.is_required
+    name = argument.parameter.name
+    option = argument.option
+    is_required = argument.is_required
     default = None if is_required else argument.parameter.default
     if isinstance(default, float):
         help_text = help_text.replace("{default}", f"{100.0 * default:g}%")

@@ -139,7 +139,8 @@ def check_words(words: list[str]) -> None:
     command = COMMANDS.get(word)
     # A group alone is a mistake, unless its help is asked for, which the parser prints.
     if isinstance(command, CommandGroup) and "-h" not in words and "--help" not in words:
-        actions, action = list(command.actions), named[1] if len(named) > 1 else None
+        actions = list(command.actions)
+        action = named[1] if len(named) > 1 else None
         if action is None and "--list" in words and "list" in actions:
             raise UsageError(f"{word}: there is no option '--list'; use 'ppafo {word} list'")
         if action is None:

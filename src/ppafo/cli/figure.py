@@ -110,7 +110,8 @@ def _figures_to_open(folder: Path, names: list[str], out: Path | None, width: fl
 
     if MARK not in names:
         raise DataError(f"{folder}: is not a result folder of ppafo; give a folder written by a ppafo command")
-    command, pictures = marking_command(folder), [name for name in names if name.endswith(".png")]
+    command = marking_command(folder)
+    pictures = [name for name in names if name.endswith(".png")]
     remedy = ""
     # Not every command is a function of the package.
     if pictures and hasattr(sys.modules["ppafo"], command):

@@ -175,7 +175,8 @@ def _run(words: list[str]) -> int:
         lines = [f"{len(error.parts)} things are wrong:", *error.parts] if error.parts else [str(error)]
         for number, line in enumerate(map(one_line, lines)):
             # Without its middle where it repeats far more of the input than anybody reads.
-            is_long, half = len(line) > _LONGEST_MESSAGE, _LONGEST_MESSAGE // 2
+            is_long = len(line) > _LONGEST_MESSAGE
+            half = _LONGEST_MESSAGE // 2
             shown = f"{line[:half]} ... {line[-half:]}" if is_long else line
             print(f"{'  ' if number else 'ppafo: '}{shown}", file=sys.stderr)
         return EXIT_BAD_INPUT

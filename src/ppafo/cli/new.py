@@ -40,7 +40,8 @@ def load_examples() -> dict[str, dict[str, Any]]:
 
 def example_files(name: str) -> dict[PurePosixPath, bytes]:
     """Return the files of an example by relative path."""
-    files, folders = {}, [(_FOLDER / name, PurePosixPath())]
+    files = {}
+    folders = [(_FOLDER / name, PurePosixPath())]
     for folder, path in folders:
         for item in folder.iterdir():
             if item.is_file():
@@ -137,7 +138,8 @@ def new(
     if name is None or not _NAME.fullmatch(name):
         given = "is missing; it" if name is None else f"{one_line(name)}:"
         raise DataError(f"NAME {given} must consist of letters, digits, - and _; give a path with --out")
-    chosen, path = KINDS[kind], out or Path(name + _SUFFIX)
+    chosen = KINDS[kind]
+    path = out or Path(name + _SUFFIX)
     if path.suffix != _SUFFIX:
         raise DataError(f"--out {path}: the name must end in {_SUFFIX}")
     if os.path.lexists(path):
@@ -179,7 +181,8 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
     """Return the text of a new file: template or source, under the new name."""
     from ppafo.documents.toml_text import value_text
 
-    templates, files = resources.files("ppafo.cli") / "templates", KINDS[kind].library
+    templates = resources.files("ppafo.cli") / "templates"
+    files = KINDS[kind].library
     content = (templates / f"{kind}{_SUFFIX}").read_bytes() if source is None else files.read(source)
     files.parse(content, source or f"template of a {kind}")
     text = content.decode("utf-8")
@@ -188,7 +191,8 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
     named = _NAME_LINE.search(text, 0, table.start() if table else len(text))
     if named is None:
         return text
-    head, rest = text[: named.start()], text[named.end() :]
+    head = text[: named.start()]
+    rest = text[named.end() :]
     if kind == "set" and source is not None:
         # 'ppafo sets audit' then lists the changes of the copy, not those of the source.
         parent = source if source in files.names() else os.path.relpath(source, path.parent)

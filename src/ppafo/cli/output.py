@@ -88,7 +88,8 @@ def deliver(answer: Any, as_json: bool, out: Path | None, command: str, *, has_w
     from ppafo.report.finding import REPORT, text_of
     from ppafo.report.writing import terminal_width
 
-    text, document = text_of(answer, terminal_width()), answer.to_dict()
+    text = text_of(answer, terminal_width())
+    document = answer.to_dict()
     folder = str(document["folder"]) if has_written else None
     usable_files: list[str] = []
     if not as_json:

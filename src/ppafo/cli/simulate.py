@@ -52,7 +52,8 @@ def simulate(
 
     with shown_in(loaded.device.shown):
         report = assessed(run_scenario(loaded), check)
-        tracking, changed = report.tracking, list(changes_in(loaded))
+        tracking = report.tracking
+        changed = list(changes_in(loaded))
         # A reference that is not followed makes the result useless, and a check fails.
         passes = report.check is None or (report.check.passes and tracking.passes)
         return CommandOutput(
@@ -150,8 +151,10 @@ def finding_of(report: _RunReport) -> "Finding[None]":
     from ppafo.report.finding import Finding, Section, columns_of
     from ppafo.report.kind import metric_text, metric_words
 
-    result, check = report.result, report.check
-    scenario, status = result.scenario, result.status
+    result = report.result
+    check = report.check
+    scenario = result.scenario
+    status = result.status
     device = f"device '{scenario.device.name}', valve '{scenario.device.valve_name}'"
     rows = [
         (metric_words(name), metric_text(metric.value, metric.unit), metric.summary)

@@ -201,7 +201,8 @@ def _ideals(scenario: Scenario, present: Mapping[str, float]) -> Iterator[Change
     of_sensors = dict[str, list[Change]]()
     is_locked = scenario.motion.locked_angle is not None
     for path, number in present.items():
-        section, item = path.partition(".")[0], declared[path]
+        section = path.partition(".")[0]
+        item = declared[path]
         is_flaw = section in ("valve", "sensors", "effects", "friction") and item.default == 0.0
         is_other = path in second or item.whole or ".opening." in path or (is_locked and section == "friction")
         if number == 0.0 or is_other or not (is_flaw or path in _FLAWS):
@@ -251,17 +252,16 @@ def _better_device(scenario: Scenario, present: Mapping[str, float]) -> Iterator
     form = {f"valve.{name}": present[f"valve.{name}"] for name in (size, kept)}
     plant = plant_parameters(scenario.device)
     swept = plant.displacement_per_radian * (plant.angle_max - plant.angle_min)
-    volume, flow = plant.dead_volume_1 + plant.dead_volume_2 + swept, plant.valve_conductance * plant.gas_product
+    volume = plant.dead_volume_1 + plant.dead_volume_2 + swept
+    flow = plant.valve_conductance * plant.gas_product
     larger = [by for by in _VALVES if volume > by * flow * _FILLED]
     # On/off valves may be too large, whose step is the swing.
     smaller = _SMALL_VALVES if only_switches(scenario, scenario.law) else ()
     for words, factors in ((SMALLER_VALVE, smaller), (LARGER_VALVE, larger)):
         for by in factors:
             yield Change(words, "device", {**form, f"valve.{size}": by * form[f"valve.{size}"]}, scenario)
-    supplies, room = (
-        [path for path in (PRESSURE_PATH, SECOND_PRESSURE_PATH) if path in present],
-        present[ATMOSPHERE_PATH],
-    )
+    supplies = [path for path in (PRESSURE_PATH, SECOND_PRESSURE_PATH) if path in present]
+    room = present[ATMOSPHERE_PATH]
     for paths in (supplies[:1], supplies[1:], supplies):
         for by in _SUPPLIES if paths else ():
             pressures = {path: room + by * (present[path] - room) for path in paths}
@@ -281,7 +281,9 @@ _STARTS = ("initial.pressure_1", "initial.pressure_2")
 
 def _starts(scenario: Scenario, present: Mapping[str, float]) -> Iterator[Change]:
     """Yield changes of the initial pressures: those that carry the load of a free joint, and those of the room."""
-    room, motion, device = present[ATMOSPHERE_PATH], scenario.motion, scenario.device
+    room = present[ATMOSPHERE_PATH]
+    motion = scenario.motion
+    device = scenario.device
     if _STARTS[0] not in present:
         return
     starts = [(room, room)]

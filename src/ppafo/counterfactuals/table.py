@@ -47,7 +47,8 @@ def excesses(changes: Sequence[Change]) -> list[float]:
 
 def _judged(base: Scenario, rows: Sequence[Mapping[str, float]]) -> list[float]:
     """Return the excess of each row of numbers [SI] by path; inf for a row that is refused or diverges."""
-    present, declared = present_numbers(base), declared_numbers(base)
+    present = present_numbers(base)
+    declared = declared_numbers(base)
     alike: dict[tuple[str, ...], list[int]] = {}
     for place, numbers in enumerate(rows):
         alike.setdefault(tuple(numbers), []).append(place)

@@ -111,7 +111,8 @@ def _named(changes: Sequence[Change]) -> list[Change]:
 
 def _first_strides(scenario: Scenario) -> Scenario:
     """Return a walk that ends after its first strides, a whole number of output intervals; other runs unchanged."""
-    run, duration = scenario.run, _STRIDES_TRIED * scenario.motion.stride_time
+    run = scenario.run
+    duration = _STRIDES_TRIED * scenario.motion.stride_time
     if scenario.follows_reference or not 0.0 < duration < run.duration:
         return scenario
     return replace(scenario, run=replace(run, duration=round(duration / run.output_interval) * run.output_interval))

@@ -66,7 +66,8 @@ class TomlKind:
 
     def read(self, name_or_path: str | Path) -> bytes:
         """Read a bundled file by name, or any other file by path."""
-        name, path = str(name_or_path), Path(name_or_path)
+        name = str(name_or_path)
+        path = Path(name_or_path)
         if name in self.names():
             return (self.shipped / (name + _SUFFIX)).read_bytes()
         is_there = os.path.exists(path)  # noqa: PTH110  # Path.exists raises where no file can have the name
@@ -115,7 +116,8 @@ def _comma(text: str, error: str) -> str:
     found = re.search(r"\(at line (\d+), column (\d+)\)", error)
     line, column = (text.split("\n")[int(found[1]) - 1], int(found[2]) - 1) if found else ("", 0)
     numbers = (each for each in _WITH_COMMA.finditer(line) if each.start() < column <= each.end())
-    number, key = next(numbers, None), KEY_LINE.match(line)
+    number = next(numbers, None)
+    key = KEY_LINE.match(line)
     # Of a list the comma separates two numbers.
     if found is None or number is None or key is None or "[" in line[: number.start()]:
         return ""

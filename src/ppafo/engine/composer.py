@@ -65,7 +65,9 @@ class Composer(ast.NodeTransformer):
         known: Mapping[str, Any] | None = None,
         rows: Mapping[str, Any] | None = None,
     ) -> None:
-        self.function, self.module, self.add_inside = function, module, add_inside
+        self.function = function
+        self.module = module
+        self.add_inside = add_inside
         names = function.__code__.co_varnames
         self.local = frozenset(names if local is None else local)
         self.parameters = frozenset(_parameters(function)) if local is None else self.local
@@ -93,7 +95,8 @@ class Composer(ast.NodeTransformer):
 
     def visit_Assign(self, node: ast.Assign) -> ast.stmt:
         """Record the NamedTuple class of each assigned name, so that ``name._replace`` can be expanded."""
-        kind, target = self.kind_of(node.value), node.targets[0]
+        kind = self.kind_of(node.value)
+        target = node.targets[0]
         parts = getattr(kind, "__args__", ())
         named = zip(target.elts, parts, strict=False) if isinstance(target, ast.Tuple) else ((target, kind),)
         for item, value in named:
@@ -110,7 +113,8 @@ class Composer(ast.NodeTransformer):
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         """Refuse a power with a literal operand, because its last bits differ between compilers and Python."""
-        left, right = self.visit(node.left), self.visit(node.right)
+        left = self.visit(node.left)
+        right = self.visit(node.right)
         # With a sign or without.
         unsigned = (side.operand if isinstance(side, ast.UnaryOp) else side for side in (left, right))
         if isinstance(node.op, ast.Pow) and any(isinstance(side, ast.Constant) for side in unsigned):
@@ -250,7 +254,8 @@ class Composer(ast.NodeTransformer):
 
     def fields_of(self, node: ast.expr) -> tuple[Any, list[ast.Attribute]]:
         """Class of a row, and an expression for each field. ProgramError if the class is not declared."""
-        row, owner = self.module.constructed(self.row_of(node)), node
+        row = self.module.constructed(self.row_of(node))
+        owner = node
         while isinstance(owner, ast.Attribute):
             owner = owner.value
         if row is None or not isinstance(owner, ast.Name):

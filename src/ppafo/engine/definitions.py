@@ -55,7 +55,8 @@ def parse_definition(function: FunctionType, adapt: Adaptation | None = None) ->
     Raises ProgramError if the definition cannot be read or differs from the code that Python runs.
     """
     code = function.__code__
-    file, name = code.co_filename, function.__qualname__
+    file = code.co_filename
+    name = function.__qualname__
     try:
         text = _source_text(function, code)
     except (OSError, TypeError) as error:

@@ -69,7 +69,8 @@ class StepText:
 
     def __post_init__(self) -> None:
         """Look up the groups of the program, and link the functions of its components."""
-        self.states, self.parameters = self.parts.state_rows(), self.parts.parameter_rows()
+        self.states = self.parts.state_rows()
+        self.parameters = self.parts.parameter_rows()
         self.of_step = self.parts.step_rows()
         self.rows = {**self.parameters, **self.states, **self.of_step}
         link_program(self.parts, self.collector.replacements)
@@ -143,7 +144,8 @@ class StepText:
         if function in self.composed:
             return self.composed[function]
         reduction = Reduction(self, function)
-        tree, effects = reduction.reduced(), reduction.effects
+        tree = reduction.reduced()
+        effects = reduction.effects
         if is_phase:
             # A group without rows lives in this phase alone.
             effects.groups = {name: fields for name, fields in effects.groups.items() if name in self.rows}
@@ -180,7 +182,8 @@ class StepText:
         # A local name may be that of a group which this function does not ask for.
         rows = {name: kind for name, kind in self.rows.items() if name in groups}
         composer = Composer(function, self.collector, self.add_inside, local, self.placeholders, rows)
-        tree.returns, tree.decorator_list = None, []
+        tree.returns = None
+        tree.decorator_list = []
         tree.body = [composer.visit(statement) for statement in tree.body]
         ast.fix_missing_locations(tree)
         tree.name = emitted_name(function)
@@ -198,7 +201,9 @@ class StepText:
         make: Any = namedtuple
         own = f"{function.__name__}_result"
         row = make(own, names)
-        row.__module__, row.__qualname__, row.__doc__ = function.__module__, own, f"What ``{function.__name__}`` sets."
+        row.__module__ = function.__module__
+        row.__qualname__ = own
+        row.__doc__ = f"What ``{function.__name__}`` sets."
         known = self.collector.owners.get(emitted_name(row))
         if known is None or known._fields == names:
             return row if known is None else known

@@ -58,7 +58,9 @@ class PythonFunctions:
         rows: _EffectRows,
         operations: "Operations | None" = None,
     ) -> None:
-        self._replacements, self._rows, self._operations = replacements, rows, operations
+        self._replacements = replacements
+        self._rows = rows
+        self._operations = operations
         self._is_plain = operations is None and replacements == Replacements()
         self._copies: dict[Any, Any] = {}
         self.made_from = MadeFrom()
@@ -355,7 +357,8 @@ class _ForColumns(ast.NodeTransformer):
         return _call("_not", inner) if isinstance(node.op, ast.Not) else ast.UnaryOp(node.op, inner)
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
-        left, right = self.visit(node.left), self.visit(node.right)
+        left = self.visit(node.left)
+        right = self.visit(node.right)
         # np.divide gives inf over 0 where Python's quotient raises, as compiled code does.
         return _call("_quotient", left, right) if isinstance(node.op, ast.Div) else ast.BinOp(left, node.op, right)
 

@@ -19,7 +19,9 @@ class PythonProgram:
 
     def advance(self, states: Floats, parameters: Floats, *arrays_and_clock: Any) -> None:
         """Advance all runs by some steps; arrays of histories and samples precede the numbers of the clock."""
-        program, histories, clock = self._program, arrays_and_clock[:4], arrays_and_clock[4:]
+        program = self._program
+        histories = arrays_and_clock[:4]
+        clock = arrays_and_clock[4:]
         tables = (program.state_rows(), states), (program.parameter_rows(), parameters)
 
         def run(operations: Operations | None) -> None:
@@ -61,7 +63,8 @@ class PythonLanes:
         trace: Floats,
     ) -> None:
         (self.groups, states), self.records, self.trace = tables[0], record, trace
-        self.signal_history, self.command_history = signal_history, command_history
+        self.signal_history = signal_history
+        self.command_history = command_history
         # Lanes that only fill a vector repeat the last run.
         width = record.shape[2] if record.size else states.shape[1]
         self.lanes = [Lane() for _ in range(width)]

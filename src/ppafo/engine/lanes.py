@@ -225,7 +225,8 @@ def run_blocks(
         steps = batch.clock.step_count
         for start in waiting:
             members = slice(start, min(start + lanes, runs))
-            parameters, states = batch.parameters[:, members], batch.states[:, members]
+            parameters = batch.parameters[:, members]
+            states = batch.states[:, members]
             block = LaneBlock(module, batch.program, batch.clock, parameters, states)
             for first_step in range(0, steps, STEPS_PER_CALL):
                 if stop.is_set():
@@ -347,7 +348,8 @@ class LaneBlock:
 
 def begin_block(batch: Batch, effort: Effort = Effort.FULL) -> LaneBlock:
     """Return a block with all runs of a batch before the first step; ValueError for more runs than a block can take."""
-    runs, lanes = batch.states.shape[1], lanes_of(batch.program)
+    runs = batch.states.shape[1]
+    lanes = lanes_of(batch.program)
     if runs > lanes:
         raise ValueError(f"a block has {lanes} lanes, one for each run, too few for {runs} runs")
     module = load_program(batch.program, effort)

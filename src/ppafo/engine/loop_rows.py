@@ -73,7 +73,8 @@ class RowsOfLanes:
 
     def for_lane(self, call: Call) -> list[str]:
         """Lines for one run: load the groups, call the phase, and store the results."""
-        effects, rows = call.phase.effects, self.step.rows
+        effects = call.phase.effects
+        rows = self.step.rows
         if not effects.results:
             return []
         loaded = {group: rows[group] for group in call.phase.handed if group in rows}
@@ -126,7 +127,8 @@ class RowsOfRun:
     """Groups of a single run: NamedTuples under their own names, including the outputs of a sample."""
 
     def __init__(self, step: StepText, outputs: str) -> None:
-        self.step, self.outputs = step, outputs
+        self.step = step
+        self.outputs = outputs
 
     def over_lanes(self, calls: Sequence[Call]) -> list[str]:
         """Lines of plain calls, whose results are assigned to the names of their groups."""

@@ -36,11 +36,13 @@ class LoopText:
 
     def __init__(self, steps: Mapping[Rows, StepText], function: Callable[..., None]) -> None:
         (self.rows, self.step), *others = steps.items()
-        self.steps, self.function = steps, function
+        self.steps = steps
+        self.function = function
         assert isinstance(function, FunctionType), "it is no other callable"
         self.reduction = Reduction(self.step, function)
         local = (*function.__code__.co_varnames, *HISTORIES, "record")
-        known, rows = self.step.placeholders, {"now": Now}
+        known = self.step.placeholders
+        rows = {"now": Now}
         self.composer = Composer(function, self.step.collector, self.step.add_inside, local, known, rows)
         self.other = LoopText(dict(others), function) if others else None
 
@@ -118,7 +120,8 @@ class LoopText:
             test = self.expression(node.test)
             if isinstance(test, ast.Constant):
                 return self.block(node.body if test.value else node.orelse)
-            body, otherwise = self.block(node.body), self.block(node.orelse)
+            body = self.block(node.body)
+            otherwise = self.block(node.orelse)
             return [ast.If(test, body or [ast.Pass()], otherwise)] if body or otherwise else []
         if self.other is None:
             return self.block(own)
@@ -209,7 +212,8 @@ def write_lanes(program: Program, collector: SourceCollector, lanes: int = 0) ->
     """Source text of a program for ``lanes`` runs, 0 for as many as fit; ``collector`` then has all its inputs."""
     step = StepText(program, collector)
     rows = RowsOfLanes(step, lanes)
-    states, parameters = len(rows.state_at), len(rows.parameter_at)
+    states = len(rows.state_at)
+    parameters = len(rows.parameter_at)
     lines = [
         f"x = empty_rows({rows.count}, {rows.lanes})",
         # A literal width lets the compiler unroll the loops of a small block.

@@ -258,7 +258,9 @@ class Program:
 @lru_cache(maxsize=256)
 def groups_of(program: Program) -> Groups:
     """Return all groups of numbers of a program by name, in the order of their rows."""
-    leg, feed, shank = program.leg, program.feed, program.shank
+    leg = program.leg
+    feed = program.feed
+    shank = program.shank
     is_alone = program.angle is None and leg is None
     is_thermal = program.is_thermal
     controller = program.controller

@@ -32,7 +32,8 @@ class RunningEvaluation(NamedTuple):
 
 def evaluate_samples(evaluation: RunningEvaluation, start: Callable[[Any], Any], columns: Mapping[str, Floats]) -> Any:
     """State after all of some recorded columns (samples,), from the state that ``start`` returns at the first one."""
-    channels, zeros = [columns[name] for name in evaluation.channels], rebuilt(evaluation.sample, repeat(0.0))
+    channels = [columns[name] for name in evaluation.channels]
+    zeros = rebuilt(evaluation.sample, repeat(0.0))
 
     def sample_of(row: Iterable[float]) -> Any:
         return zeros._replace(**dict(zip(evaluation.channels, row, strict=True)))
@@ -53,8 +54,10 @@ def evaluate_samples(evaluation: RunningEvaluation, start: Callable[[Any], Any],
 @lru_cache(maxsize=8)
 def _written(evaluation: RunningEvaluation) -> tuple[MadeFrom, str]:
     """Inputs and source text of an evaluation; its entry ``evaluate`` changes the numbers of the state."""
-    collector, numbers = SourceCollector(INLINE), leaf_paths(evaluation.state, "state")
-    ahead, update = collector.add(evaluation.ahead), collector.add(evaluation.update)
+    collector = SourceCollector(INLINE)
+    numbers = leaf_paths(evaluation.state, "state")
+    ahead = collector.add(evaluation.ahead)
+    update = collector.add(evaluation.update)
     stored = {path: f"numbers[{place}]" for place, path in enumerate(numbers)}
 
     def sample_at(index: str) -> str:

@@ -146,7 +146,8 @@ class Reduction:
     """Reduction of one function for a ``StepText``, and for its ``parts`` or for others."""
 
     def __init__(self, module: Any, function: FunctionType, parts: Any = None) -> None:
-        self.module, self.function = module, function
+        self.module = module
+        self.function = function
         self.definition = definition_of(function)
         self.scope: dict[str, Any] = function.__globals__
         self.known: dict[str, Any] = {"parts": module.parts if parts is None else parts}
@@ -335,7 +336,8 @@ class Reduction:
             name = self.value_of(node.args[1])
             return ast.Attribute(self.visit(node.args[0]), name, ast.Load())
         if called in (section_row, component_row):
-            kind, section = self.outside_value(node.args[0]), self.text_of(node.args[2])
+            kind = self.outside_value(node.args[0])
+            section = self.text_of(node.args[2])
             if called is component_row:
                 paths = (f"{section}.{quantity.name}" for quantity in kind.quantities)
                 return self.row_of(kind.parameters, (ast.Attribute(node.args[1], path, ast.Load()) for path in paths))
@@ -398,11 +400,14 @@ class Reduction:
             return
         (loop,) = node.value.generators
         assert isinstance(loop.target, ast.Name)
-        before, running = self.known, self.run_time_names
+        before = self.known
+        running = self.run_time_names
         for element in self.items_of(loop.iter):
-            self.known, self.run_time_names = {**before, loop.target.id: element}, running - {loop.target.id}
+            self.known = {**before, loop.target.id: element}
+            self.run_time_names = running - {loop.target.id}
             made = self.visit(node.value.elt)
-            self.known, self.run_time_names = before, running
+            self.known = before
+            self.run_time_names = running
             yield made
 
     def items_of(self, node: ast.expr) -> list[Any]:
@@ -451,7 +456,8 @@ class Reduction:
         if isinstance(test, ast.Constant):
             return self.block(node.body if test.value else node.orelse)
         before = set(self.groups_set)
-        body, set_in_body = self.block(node.body), self.groups_set
+        body = self.block(node.body)
+        set_in_body = self.groups_set
         self.groups_set = set(before)
         otherwise = self.block(node.orelse)
         for name in sorted((set_in_body ^ self.groups_set) - before):
@@ -517,7 +523,8 @@ class Reduction:
             self.note_set(name, fields)
             return ast.Name(_GROUP + name, ast.Store())
         if isinstance(target, ast.Subscript) and self.group_path(target.value) in HISTORIES:
-            history, places = self.group_path(target.value), tuple(map(self.visit, _indices(target)))
+            history = self.group_path(target.value)
+            places = tuple(map(self.visit, _indices(target)))
             known = [index.value for index in places if isinstance(index, ast.Constant)]
             # A trace has the names of its channels.
             words = [self.module.parts.traced[index] if history == TRACE else str(index) for index in known]

@@ -67,7 +67,8 @@ def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
 
     If a command is given, the program must have no controller. Raises KeyError for the path of an unknown parameter.
     """
-    runs, lanes = batch.states.shape[1], lanes_of(batch.program)
+    runs = batch.states.shape[1]
+    lanes = lanes_of(batch.program)
     blocks = [slice(first, min(first + lanes, runs)) for first in range(0, runs, lanes)]
     command_row = row_numbers(batch.program.state_rows())[COMMAND]
     parameter_rows = row_numbers(batch.program.parameter_rows())
@@ -77,12 +78,14 @@ def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
     # Steps at which any input differs from the step before, the first step among them.
     starts = [0, *(np.flatnonzero((np.diff(table, axis=1) != 0.0).any(axis=0)) + 1).tolist()]
     ends = [*starts[1:], batch.clock.step_count]
-    results, before = [], None
+    results = []
+    before = None
     if inputs.earlier is not None:
         states, before = _started(batch, inputs.earlier)
         batch = replace(batch, states=states)
     for runs_of_block in blocks:
-        parameters, states = batch.parameters[:, runs_of_block], batch.states[:, runs_of_block]
+        parameters = batch.parameters[:, runs_of_block]
+        states = batch.states[:, runs_of_block]
         block = begin_block(replace(batch, parameters=parameters, states=states))
         if before is not None:
             block.set_earlier(before[:, runs_of_block])
@@ -101,8 +104,11 @@ def _started(batch: Batch, earlier: Floats) -> tuple[Floats, Floats]:
 
     For a first one that is not known stands the command that holds the pressures at the start.
     """
-    program, delay, states = batch.program, batch.clock.command_delay, batch.states.copy()
-    valve, kinds = program.valve, program.parameter_rows()
+    program = batch.program
+    delay = batch.clock.command_delay
+    states = batch.states.copy()
+    valve = program.valve
+    kinds = program.parameter_rows()
     # The last ones have not arrived yet.
     arrived = earlier[: max(1, earlier.size - delay)]
     changes = np.flatnonzero(np.diff(arrived)) + 1
@@ -113,10 +119,12 @@ def _started(batch: Batch, earlier: Floats) -> tuple[Floats, Floats]:
         if math.isnan(first):
             first = 0.0 if valve.command_for is None else valve.command_for(own, 0.0, *pressures)
         begins = (changes - earlier.size + delay + timing.command_lag) * timing.step
-        shown, time = valve.state(), _LONG_AGO
+        shown = valve.state()
+        time = _LONG_AGO
         for command, end in zip([first, *arrived[changes].tolist()], [*begins.tolist(), 0.0], strict=True):
             if time == _LONG_AGO and valve.holding is not None:
-                shown, time = valve.holding(own, command, *pressures), end
+                shown = valve.holding(own, command, *pressures)
+                time = end
             while time < end:
                 settled = valve.settle(own, shown, command, time)
                 until = min(end, max(valve.next_event(own, settled, command, time), time + _LEAST_PART))

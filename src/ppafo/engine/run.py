@@ -145,7 +145,8 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     numbers = (run.needs_parts, run.step_count, run.steps_per_sample, run.record_every, signal_steps, command_steps)
     counts = np.column_stack([np.full(runs, number, dtype=np.float64) for number in numbers])
     if runs == 1 or (counts == counts[0]).all():
-        clocks, groups = counts[:1], [np.arange(runs)]
+        clocks = counts[:1]
+        groups = [np.arange(runs)]
     else:
         clocks, group = np.unique(counts, axis=0, return_inverse=True)
         # Places of the runs of each clock, in order.
@@ -203,7 +204,8 @@ def _states_of(run: Run) -> dict[str, Any]:
 
 def states_at_start(run: Run) -> list[Any]:
     """Return the initial effect states of a run, in the order of the program; arrays (runs,) if the run has arrays."""
-    initial, program = run.initial, run.program
+    initial = run.initial
+    program = run.program
     if not program.effect_states:
         return []
     pressures = pressures_of(program.actuator, run.plant, initial.angle, initial.mass_1, initial.mass_2)

@@ -162,7 +162,8 @@ class SourceCollector:
         # Rows of effects come first in every function, so that callers can hand them over without knowing the rest.
         names.sort(key=lambda name: name not in own_rows)
         body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body
-        tree.name, tree.returns = name, None
+        tree.name = name
+        tree.returns = None
         tree.body = [composer.visit(statement) for statement in body]
         # Rows of called functions for which this function has no parameter are passed on by its callers.
         passed_on = sorted(composer.rows_to_receive)

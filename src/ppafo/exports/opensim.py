@@ -38,7 +38,8 @@ def device_torque(result: WalkResult, side: Side, strikes: Sequence[float]) -> R
     """Return the device torque on OpenSim's ankle [N m], positive in dorsiflexion; see ``opensim_files``."""
     if result.status.time is not None:
         raise ScenarioError(f"{result.scenario.name}: {result.status.message}")
-    time, torque = result.recording.time, result.recording["external_torque"]
+    time = result.recording.time
+    torque = result.recording["external_torque"]
     if strikes:
         check_strikes(strikes)
         if "external_torque" not in result.averages:

@@ -179,7 +179,8 @@ def gait_toml(gait: Gait) -> str:
     for path, (name, quantity) in _NUMBERS.items():
         table, _, key = path.partition(".")
         lines += [] if table == section else ["", f"[{table}]"]
-        section, value = table, getattr(gait, name)
+        section = table
+        value = getattr(gait, name)
         if quantity.whole:
             lines.append(f"{key} = {value}")
         elif value is not None and value != quantity.default:

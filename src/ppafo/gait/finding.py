@@ -39,7 +39,8 @@ class GaitFound:
 
     def json_document(self) -> dict[str, Any]:
         """Return numbers, curves and, after an import, strides as plain data in SI units."""
-        gait, imported = self.gait, self.imported
+        gait = self.gait
+        imported = self.imported
         document: dict[str, Any] = {
             **fields_of(gait, *(item.name for item in fields(Gait) if item.name not in CURVES)),
             "phases": PHASES.tolist(),
@@ -153,7 +154,9 @@ _PANELS: dict[str, Kind] = {
 def _panel(gait: Gait, name: str, imported: ImportedGait | None, is_first: bool) -> Panel:
     """Return the panel of one curve over the stride, with the single strides in the background after an import."""
     sign = clinical_angle if name == "ankle_angle" else np.asarray
-    curve, percent, toe_off = gait.curves[name], 100.0 * PHASES, 100.0 * gait.stance_share
+    curve = gait.curves[name]
+    percent = 100.0 * PHASES
+    toe_off = 100.0 * gait.stance_share
     series = sign(curve.values_at(PHASES))
     marks = [
         Mark("span", (0.0, toe_off), colour=_STANCE, style={"alpha": 0.5}),
@@ -161,11 +164,14 @@ def _panel(gait: Gait, name: str, imported: ImportedGait | None, is_first: bool)
         Mark("at", toe_off, colour=ORANGE, style={"linewidth": 1.0}),
     ]
     if imported is None:
-        mean, band = series, np.full(series.size, curve.deviation)
+        mean = series
+        band = np.full(series.size, curve.deviation)
         label = "standard deviation, mean over the stride"
     else:
         found = imported.curves[name]
-        mean, band, label = sign(found.mean), found.deviation, "standard deviation"
+        mean = sign(found.mean)
+        band = found.deviation
+        label = "standard deviation"
         marks.append(Mark("line", percent, sign(found.curves).T, colour=GREY, style={"linewidth": 0.6, "alpha": 0.5}))
     named = "series" if imported is None else "mean of the strides"
     marks += [
@@ -180,7 +186,8 @@ def _panel(gait: Gait, name: str, imported: ImportedGait | None, is_first: bool)
         """Label heel strike and toe-off at heights that the curve of the shank leaves free."""
         axes.set_xlim(0.0, 100.0)
         for at, height, text in ((0.0, 0.05, "heel strike"), (toe_off, 0.85, "toe-off")) if is_first else ():
-            place, offset = ("data", "axes fraction"), "offset points"
+            place = ("data", "axes fraction")
+            offset = "offset points"
             axes.annotate(
                 text,
                 (at, height),

@@ -102,7 +102,8 @@ class GaitCurve:
     def derivative(self, stride_time: float) -> "GaitCurve":
         """Return the time derivative for a stride time [s]; its deviation between strides is unknown and set to 0."""
         angular = 2.0 * np.pi / stride_time * (1.0 + np.arange(self.harmonics))
-        cosines, sines = angular * np.array(self.sines), -angular * np.array(self.cosines)
+        cosines = angular * np.array(self.sines)
+        sines = -angular * np.array(self.cosines)
         return GaitCurve(0.0, tuple(cosines.tolist()), tuple(sines.tolist()))
 
     def scale(self, factor: float) -> "GaitCurve":
@@ -115,7 +116,8 @@ class GaitCurve:
     def values_at(self, phases: "ArrayLike") -> Floats:
         """Return the values of the curve at an array of phases [strides]."""
         first_sine, first_cosine = sine_and_cosine(np.asarray(phases, dtype=np.float64))
-        sine, cosine = first_sine, first_cosine
+        sine = first_sine
+        cosine = first_cosine
         # The mean in the shape of the phases, a number or an array.
         values = self.mean + 0.0 * first_cosine
         for of_cosine, of_sine in zip(self.cosines, self.sines, strict=True):
@@ -231,7 +233,8 @@ def fit_curve(values: Floats, harmonics: int, deviation: float = 0.0) -> tuple[G
     # Least squares over all samples, not a transform: both ends belong to one phase, and samples may be few.
     solution = np.linalg.lstsq(design, values, rcond=None)[0]
     residuals = design @ solution - values
-    cosines, sines = solution[1 : harmonics + 1].tolist(), solution[harmonics + 1 :].tolist()
+    cosines = solution[1 : harmonics + 1].tolist()
+    sines = solution[harmonics + 1 :].tolist()
     error = FitError(float(np.sqrt(np.mean(residuals**2))), float(np.max(np.abs(residuals))))
     return GaitCurve(float(solution[0]), tuple(cosines), tuple(sines), deviation), error
 

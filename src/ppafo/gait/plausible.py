@@ -108,7 +108,8 @@ def _faults(walk: MeanStride) -> Iterator[str]:
     """Yield the faults of a stride; a wrong unit is not told again as a wrong sign."""
     yield from _outside(f"{walk.file['shank_angle']}: the stride time is {{}} s", walk.stride_time, STRIDE_TIME)
     decides = "vertical_force" if "vertical_force" in walk.curves else "shank_angle"
-    share, limits = 100.0 * walk.stance_share, (100.0 * STANCE_FRACTION[0], 100.0 * STANCE_FRACTION[1])
+    share = 100.0 * walk.stance_share
+    limits = (100.0 * STANCE_FRACTION[0], 100.0 * STANCE_FRACTION[1])
     said = f"{walk.file[decides]}: the foot is on the ground for {{}} % of the stride, by {decides}"
     stance = [*_outside(said, share, limits)]
     yield from stance or _of_moment_time(walk)
@@ -177,7 +178,8 @@ MIDSTANCE = slice(15, 41)
 
 def _of_shank(walk: MeanStride) -> Iterator[str]:
     """Yield the faults of a shank angle that no leg can have."""
-    phi, where = np.degrees(walk.curves["shank_angle"]), walk.where("shank_angle")
+    phi = np.degrees(walk.curves["shank_angle"])
+    where = walk.where("shank_angle")
     # The range is free of the zero, so that a wrong unit shows before a wrong zero.
     ranges = [*range_faults(where, walk.curves["shank_angle"], SHANK_RANGE)]
     # Means of five samples at both ends: a single one may lie on a tremor.
@@ -208,7 +210,8 @@ def range_faults(where: str, angle: Floats, limits: tuple[float, float], is_whol
 
 def _of_ankle(walk: MeanStride) -> Iterator[str]:
     """Yield the faults of an ankle angle that is implausible together with the shank angle."""
-    shank, ankle = walk.curves["shank_angle"], walk.curves["ankle_angle"]
+    shank = walk.curves["shank_angle"]
+    ankle = walk.curves["ankle_angle"]
     turned, reversed_turned = standing_turns(shank, ankle)
     if turned > CLEARLY_BETTER * reversed_turned and turned > _TURNS:
         yield (
@@ -259,7 +262,8 @@ def standing_turns(shank: Floats, ankle: Floats) -> tuple[float, float]:
     """
     # A flat foot stands still while the shank leans: the ankle then follows the shank, with the sign as it is or
     # reversed.
-    lean, stand = np.degrees(shank)[MIDSTANCE], np.degrees(ankle)[MIDSTANCE]
+    lean = np.degrees(shank)[MIDSTANCE]
+    stand = np.degrees(ankle)[MIDSTANCE]
     return float(np.std(stand - lean)), float(np.std(stand + lean))
 
 
@@ -283,7 +287,8 @@ def stride_remarks(curves: Mapping[str, Floats]) -> list[str]:
             f"by {reversed_turned:.2g} deg with the opposite sign"
         )
     if "ankle_moment" in curves:
-        down, up = float(np.max(curves["ankle_moment"])), float(-np.min(curves["ankle_moment"]))
+        down = float(np.max(curves["ankle_moment"]))
+        up = float(-np.min(curves["ankle_moment"]))
         if up > _UNCLEAR_MOMENT * down:
             remarks.append(
                 f"the sign of ankle_moment is uncertain: it peaks at {down:.2g} N m/kg in plantarflexion and {up:.2g} "
@@ -320,8 +325,10 @@ def check_force_scale(file: str, force: Floats) -> None:
 def moment_faults(walk: MeanStride) -> Iterator[str]:
     """Yield the fault of an implausible ankle moment, by its sign or else by its peak."""
     if "ankle_moment" in walk.curves:
-        moment, where = walk.curves["ankle_moment"], walk.where("ankle_moment")
-        lowest, peak = float(np.min(moment)), float(np.max(moment))
+        moment = walk.curves["ankle_moment"]
+        where = walk.where("ankle_moment")
+        lowest = float(np.min(moment))
+        peak = float(np.max(moment))
         if float(np.mean(moment)) < 0.0 and -lowest > CLEARLY_BETTER * peak:
             yield f"{where} peaks at {lowest:.3g} N m/kg, in dorsiflexion, so its sign is reversed"
         else:
@@ -332,9 +339,12 @@ def _of_moment_time(walk: MeanStride) -> Iterator[str]:
     """Yield the fault of an ankle moment that acts while the foot is off the ground."""
     if "ankle_moment" not in walk.curves:
         return
-    moment, fraction = walk.curves["ankle_moment"], walk.stance_share
-    phase, peak = np.linspace(0.0, 1.0, moment.size), float(np.max(moment))
-    at, swing = float(phase[np.argmax(moment)]), float(np.max(moment[phase > fraction + _AFTER_TOE_OFF]))
+    moment = walk.curves["ankle_moment"]
+    fraction = walk.stance_share
+    phase = np.linspace(0.0, 1.0, moment.size)
+    peak = float(np.max(moment))
+    at = float(phase[np.argmax(moment)])
+    swing = float(np.max(moment[phase > fraction + _AFTER_TOE_OFF]))
     if at >= fraction or swing >= max(_LEFT_IN_SWING * peak, _FOOT_ALONE):
         where = "" if at >= fraction else f" and is {swing:.2g} N m/kg in swing"
         yield (
@@ -346,12 +356,14 @@ def _of_moment_time(walk: MeanStride) -> Iterator[str]:
 def _of_loads(walk: MeanStride) -> Iterator[str]:
     """Yield the faults of a vertical force, and of a centre of pressure that no foot can have."""
     if "vertical_force" in walk.curves:
-        force, where = walk.curves["vertical_force"], walk.where("vertical_force")
+        force = walk.curves["vertical_force"]
+        where = walk.where("vertical_force")
         yield from _outside(f"{where} has a mean of {{}} body weights", float(np.mean(force)), FORCE_MEAN)
         yield from _outside(f"{where} has a peak of {{}} body weights", float(np.max(force)), FORCE_PEAK)
     if "centre_of_pressure" in walk.curves:
         place, (low, high) = walk.curves["centre_of_pressure"], UNDER_FOOT
-        back, front = float(np.min(place)), float(np.max(place))
+        back = float(np.min(place))
+        front = float(np.max(place))
         if back < low or front > high or front - back < LEAST_ROLL:
             yield (
                 f"{walk.where('centre_of_pressure')} is {back:.3g} to {front:.3g} m in front of the ankle (plausible: "
@@ -392,7 +404,8 @@ def turning_about_ankle(shank: Floats, stride_time: float) -> Floats:
     percent = np.linspace(0.0, 1.0, shank.size)[FOOT_FLAT]
     rates = curve.derivative(stride_time)
     phi, rate, acceleration = (series.values_at(percent) for series in (curve, rates, rates.derivative(stride_time)))
-    sine, cosine = np.sin(phi), np.cos(phi)
+    sine = np.sin(phi)
+    cosine = np.cos(phi)
     forward = sine * rate**2 - cosine * acceleration
     # Centripetal and tangential acceleration of a point that turns about the ankle.
     up = -cosine * rate**2 - sine * acceleration
@@ -439,7 +452,8 @@ def _of_turning_knee(walk: MeanStride) -> Iterator[str]:
 
 def _of_knee_curve(walk: MeanStride, name: str) -> Iterator[str]:
     """Yield the fault of a knee acceleration by its range or else by its sign, which shows in the swing."""
-    values, where = walk.curves[name], walk.where(name)
+    values = walk.curves[name]
+    where = walk.where(name)
     travel = float(np.ptp(values))
     ranges = [*_outside(f"{where} has a range of {{}} m/s^2 per stride", travel, KNEE_TRAVEL)]
     yield from ranges

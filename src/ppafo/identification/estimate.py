@@ -66,7 +66,8 @@ def interval_texts(value: float, low: float, high: float) -> tuple[str, str, str
 
     The value has two significant digits of the nearer end, but of 5 % of itself where a bound is nearer.
     """
-    below, above = value - low, high - value
+    below = value - low
+    above = high - value
     error = max(min(below, above), min(_NEAREST * abs(value), max(below, above)))
     return digits_of(value, error), digits_of(low, max(below, error)), digits_of(high, max(above, error))
 

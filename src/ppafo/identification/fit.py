@@ -175,8 +175,12 @@ class FitRuns:
         memory: int,
         is_motion: bool,
     ) -> None:
-        self._residuals, self.numbers, self.blocks, self.report = residuals, numbers, blocks, report
-        self.memory, self.is_motion = memory, is_motion
+        self._residuals = residuals
+        self.numbers = numbers
+        self.blocks = blocks
+        self.report = report
+        self.memory = memory
+        self.is_motion = is_motion
         self.scale = np.array([number.scale for number in numbers])
         self.start, self.low, self.high, deviation = (
             np.array([getattr(number, name) for number in numbers]) / self.scale
@@ -207,7 +211,8 @@ class FitRuns:
         One-sided differences are accurate enough for the search; where one of their runs fails, central differences are
         returned. Raises IdentificationError if no run succeeds on either side of a variable.
         """
-        above, below = np.minimum(point + self.steps, self.high), np.maximum(point - self.steps, self.low)
+        above = np.minimum(point + self.steps, self.high)
+        below = np.maximum(point - self.steps, self.low)
         if not is_central:
             side = np.where(above - point >= point - below, above, below)
             values = self.residuals_at_points(point[:, None] + np.diag(side - point))
@@ -218,7 +223,8 @@ class FitRuns:
         runs_above, runs_below = (np.isfinite(values).all(axis=0) for values in (values_above, values_below))
         # Where a side has no run, the point itself is the other end of the difference.
         runs_both = runs_above & runs_below
-        first, second = np.where(runs_above, above, below), np.where(runs_both, below, point)
+        first = np.where(runs_above, above, below)
+        second = np.where(runs_both, below, point)
         failing = np.flatnonzero(~(runs_above | runs_below) | (first == second))
         if failing.size:
             number = self.numbers[failing[0]]
@@ -244,7 +250,8 @@ class FitRuns:
 
         ``series`` has the residuals as first column; further columns are the uncertainty of the fitted model.
         """
-        noise, by_channel = np.empty(len(series)), {}
+        noise = np.empty(len(series))
+        by_channel = {}
         for channel, blocks in self.channels.items():
             samples = np.concatenate([series[block.rows] for block in blocks])
             pooled = max(math.sqrt(np.square(samples).sum() / len(samples)), self._least_noise[channel])
@@ -295,7 +302,8 @@ def _linear_at(
     noise re-estimated until both agree (expectation maximisation). Rows ``left_out`` say nothing. Kind and order of the
     noise are those of ``like`` by channel, if it has any.
     """
-    step, hidden = np.zeros(len(point)), np.zeros((len(residuals), 0))
+    step = np.zeros(len(point))
+    hidden = np.zeros((len(residuals), 0))
     limits = runs.low - point - 1.0e-300, runs.high - point + 1.0e-300
     # A sample with a number of its own, of no known size, says nothing: so it is left out of any noise.
     own_numbers = np.zeros((len(residuals), len(left_out)))
@@ -310,7 +318,8 @@ def _linear_at(
         series = np.column_stack([residuals + slopes @ step, hidden])
         series[left_out] = 0.0
         noise, sizes = runs.deviations(series)
-        sensors, scaled = {}, np.column_stack([residuals, slopes, common]) / noise[:, None]
+        sensors = {}
+        scaled = np.column_stack([residuals, slopes, common]) / noise[:, None]
         rows = np.column_stack([scaled, own_numbers])
         for channel, blocks in runs.channels.items():
             own = [series[block.rows] / noise[block.rows, None] for block in blocks]
@@ -380,9 +389,11 @@ def _interval_ends(linear: Linear, point: Floats, times: float) -> tuple[Floats,
     how many standard errors priors and samples tell a point from the estimate. It is searched from the linear limit to
     the bound, which is the limit where the samples determine none.
     """
-    runs, covariance = linear.runs, linear.root @ linear.root.T
+    runs = linear.runs
+    covariance = linear.root @ linear.root.T
     wide = times * np.sqrt(np.diag(covariance))
-    low, high = np.maximum(point - wide, runs.low), np.minimum(point + wide, runs.high)
+    low = np.maximum(point - wide, runs.low)
+    high = np.minimum(point + wide, runs.high)
     least = linear.cost(runs.residuals_at(point), point)
     for number in np.flatnonzero(runs.prior == 0.0).tolist():
         way = covariance[:, number] / covariance[number, number]
@@ -412,9 +423,11 @@ def _interval_ends(linear: Linear, point: Floats, times: float) -> tuple[Floats,
                     end = bound
                     break
                 else:
-                    before, inner = inner, (reached, profile)
+                    before = inner
+                    inner = (reached, profile)
                 other = before if outer is None else outer
-                rise, missing = abs(other[1] - inner[1]), times - inner[1]
+                rise = abs(other[1] - inner[1])
+                missing = times - inner[1]
                 # Between two points the secant stays away from both; beyond them its distance may double.
                 away = np.abs(np.array([inner[0][number] - point[number], other[0][number] - inner[0][number]]))
                 most = away[0] / away[1] if outer is None else 1.0 - _AWAY
@@ -453,7 +466,9 @@ def _least_along(linear: Linear, point: Floats, number: int) -> tuple[float, Flo
         fall = squares - reached
         if not fall > 0.0:
             break
-        point, residuals, squares = tried, found, reached
+        point = tried
+        residuals = found
+        squares = reached
         if fall < _SETTLED:
             break
     return squares, point
@@ -504,8 +519,10 @@ def _conflict_of(runs: FitRuns, rows: Floats, point: Floats, free: Flags, freedo
     H_g^-1 - C. With C = L L' and the eigenvalues a of L' H_g L, both are diagonal: d'(H_g^-1 - C)^-1 d is the sum of
     q^2 / (a (1 - a)).
     """
-    errors, slopes = rows[:, 0], rows[:, 1:][:, free]
-    prior, shift = np.square(runs.prior[free]), (point - runs.start)[free]
+    errors = rows[:, 0]
+    slopes = rows[:, 1:][:, free]
+    prior = np.square(runs.prior[free])
+    shift = (point - runs.start)[free]
     root, seen = _root_of_inverse(slopes.T @ slopes + np.diag(prior))
     root = root[:, seen]
     variance = np.square(root).sum(axis=1)
@@ -533,7 +550,8 @@ def _conflict_of(runs: FitRuns, rows: Floats, point: Floats, free: Flags, freedo
         count = tested.sum()
         if not count:
             continue
-        alone, axes = alone[tested], root @ turned[:, tested]
+        alone = alone[tested]
+        axes = root @ turned[:, tested]
         along = axes.T @ pull
         statistic = np.sum(np.square(along) / (alone * (1.0 - alone)))
         p = min(fisher.sf(statistic / count, count, freedom) * count_of_tests, 1.0)
@@ -542,7 +560,8 @@ def _conflict_of(runs: FitRuns, rows: Floats, point: Floats, free: Flags, freedo
         # A number of which the group says nothing moves by rounding alone. Along one direction all part as far.
         ratios = np.where(spread > 1.0e-6 * np.sqrt(variance), moved / np.maximum(spread, 1.0e-300), 0.0)
         most = np.argmax(ratios > (1.0 - 1.0e-6) * ratios.max())
-        number, ratio = numbers[most].name, ratios[most]
+        number = numbers[most].name
+        ratio = ratios[most]
         words = f"{name}, fitted alone, would have other values: {number} by {ratio:.1f} standard errors"
         found.append(Conflict(name, number, ratio, p, words))
     # The stated value of a tolerance is a group of its own: its mean parts from the fit by deviation^2 - C.
@@ -556,7 +575,8 @@ def _conflict_of(runs: FitRuns, rows: Floats, point: Floats, free: Flags, freedo
     for family in dict.fromkeys(number.family for number in numbers if number.family):
         members = [index for index, number in enumerate(numbers) if number.family == family and prior[index] > 0.0]
         weight = np.sqrt(prior[members])
-        moved, own = shift[members] * weight, root[members] * weight[:, None]
+        moved = shift[members] * weight
+        own = root[members] * weight[:, None]
         alone, axes = np.linalg.eigh(np.eye(len(members)) - own @ own.T)
         tested = alone > _PARTING
         if len(members) > 1 and tested.any():
@@ -638,9 +658,11 @@ def fit(
     # Of starts drawn within the bounds, the two of the lowest robust cost are followed, where it is below the fit's:
     # with a wrong law, most starts end at the same point.
     is_sought = ~(runs.prior > 0.0)
-    point, is_excess = best.values / runs.scale, runs.base.any(axis=1)
+    point = best.values / runs.scale
+    is_excess = runs.base.any(axis=1)
     point = point - runs.base @ point
-    low, high = np.maximum(runs.low, -1.0e3)[is_sought], np.minimum(runs.high, 1.0e3)[is_sought]
+    low = np.maximum(runs.low, -1.0e3)[is_sought]
+    high = np.minimum(runs.high, 1.0e3)[is_sought]
     is_ratio = (low > 0.0) & (high > 10.0 * low)
     with np.errstate(invalid="ignore", divide="ignore"):
         ends = [np.where(is_ratio, np.log(end), end) for end in (low, high)]
@@ -667,7 +689,8 @@ def fit(
 def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
     """Return the fit, with intervals and consistency tests, found by a search from a scaled start point."""
     point, linear, step, gain, outliers = _least_squares(runs, start)
-    errors, jacobian = linear.rows[:, 0], linear.rows[:, 1:]
+    errors = linear.rows[:, 0]
+    jacobian = linear.rows[:, 1:]
     covariance = linear.root @ linear.root.T
     # Effective degrees of freedom: samples less the trace of J C J', to which a prior contributes little.
     freedom = max(len(errors) - np.sum(jacobian * (jacobian @ covariance)), 1.0)
@@ -694,7 +717,8 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
     for row, base in np.argwhere(runs.base).tolist():
         correlation = covariance[row, base] / math.sqrt(covariance[row, row] * covariance[base, base])
         for limits, sign in ((low, -1.0), (high, 1.0)):
-            own, below = limits[row] - point[row], limits[base] - point[base]
+            own = limits[row] - point[row]
+            below = limits[base] - point[base]
             width = math.sqrt(max(own * own + below * below + 2.0 * correlation * own * below, 0.0))
             limits[row] = point[row] + point[base] + sign * width
         low[row] = max(low[row], low[base] + runs.low[row])
@@ -754,7 +778,8 @@ def _least_squares(runs: FitRuns, start: Floats) -> tuple[Floats, Linear, Floats
     white noise, then the noise of each channel. Its kind and order, and samples of high leverage, are chosen once, at
     the minimum for white noise: chosen on the way, they would depend on the start.
     """
-    point, outliers = np.clip(start, runs.low, runs.high), np.zeros(0, dtype=np.intp)
+    point = np.clip(start, runs.low, runs.high)
+    outliers = np.zeros(0, dtype=np.intp)
     weight = np.zeros(0)
 
     def weighted(x: Floats) -> Floats:
@@ -768,7 +793,8 @@ def _least_squares(runs: FitRuns, start: Floats) -> tuple[Floats, Linear, Floats
     residuals = runs.residuals_at(point)
     if not np.isfinite(residuals).all():
         raise IdentificationError("every run fails at the start values")
-    started, bounds = time.monotonic(), (runs.low, runs.high)
+    started = time.monotonic()
+    bounds = (runs.low, runs.high)
     usual = {"method": "trf", "x_scale": "jac", "xtol": 1.0e-9, "gtol": None, "max_nfev": _EVALUATIONS}
     for number, (loss, least) in enumerate([("soft_l1", _ROUGH), ("linear", _FINE)]):
         runs.report(Progress("fit", number, 2, noun="passes", elapsed=time.monotonic() - started))
@@ -788,8 +814,12 @@ def _least_squares(runs: FitRuns, start: Floats) -> tuple[Floats, Linear, Floats
             order = np.argsort(-np.concatenate(sizes), kind="stable")[: int(_LEFT_OUT * len(residuals))]
             outliers = np.sort(np.concatenate(rows)[order])
         residuals[outliers] = 0.0
-    residuals, jacobian, left_out = runs.residuals_at(point), runs.jacobian(point), outliers
-    kinds, stage, last = {channel: Noise(1.0) for channel in runs.channels}, 0, 2 if runs.is_motion else 1
+    residuals = runs.residuals_at(point)
+    jacobian = runs.jacobian(point)
+    left_out = outliers
+    kinds = {channel: Noise(1.0) for channel in runs.channels}
+    stage = 0
+    last = 2 if runs.is_motion else 1
     for _ in range(_GAUSS_NEWTON):
         linear, step = _linear_at(runs, point, residuals, jacobian, left_out, kinds)
         runs.adapt_steps(jacobian, 1.0 / linear.noise)
@@ -799,13 +829,16 @@ def _least_squares(runs: FitRuns, start: Floats) -> tuple[Floats, Linear, Floats
         reached, trial, trial_residuals = _best_along(linear, point, residuals, step, linear.rows[:, 1:])
         gain = min(squares - reached, before - after)
         if squares > reached:
-            point, residuals = trial, trial_residuals
+            point = trial
+            residuals = trial_residuals
         if gain >= _GAIN:
-            kinds, jacobian = linear.sensors, runs.jacobian(point)
+            kinds = linear.sensors
+            jacobian = runs.jacobian(point)
             continue
         if stage == last:
             break
-        stage, kinds = stage + 1, {}
+        stage = stage + 1
+        kinds = {}
         if stage == 2:
             # Near an impact the derivative holds on one side only, so that a sample would determine a variable falsely.
             leverage = np.square(linear.rows[:, 1:] @ linear.root).sum(axis=1)
@@ -823,7 +856,8 @@ def estimate_of(fitted: Fit, row: int, recordings: Sequence[str], conflict: str)
     value, low, high = (float(column[row]) for column in (fitted.values, fitted.low, fitted.high))
     bounds = max(number.low, fitted.by_name.get(number.base, -math.inf)), number.high
     width = relative_half_width(value, low, high, number.size)
-    exact, near = _AT_BOUND * number.scale, _NEAR * (high - low) if math.isfinite(high - low) else 0.0
+    exact = _AT_BOUND * number.scale
+    near = _NEAR * (high - low) if math.isfinite(high - low) else 0.0
     bound = next((end for end in bounds if abs(value - end) <= max(exact, near)), None)
     # Not 1e-17 where 0 is meant.
     value = bound if bound is not None and abs(value - bound) <= exact else value
@@ -838,13 +872,15 @@ def estimate_of(fitted: Fit, row: int, recordings: Sequence[str], conflict: str)
     # Of parts that are shown as equal, such as those of both chambers, the name decides.
     parts.sort(key=lambda part: (-float(f"{part[1]:.2g}"), part[0]))
     largest = ", ".join(f"{part} ({percentage(share, 2)})" for part, share in parts[:NAMED])
-    text, why = number.text, f"variance from {largest}"
+    text = number.text
+    why = f"variance from {largest}"
     if bound == 0.0 and number.size is not None and width < UNKNOWN:
         text = f"{text}: none"
     elif combination is not None and not text:
         verdict = "not identifiable"
         # So far from where it was linearised the interval of a straight line means nothing.
-        low, high = min(low, bounds[0]), max(high, bounds[1])
+        low = min(low, bounds[0])
+        high = max(high, bounds[1])
         others = [other for other in combination if other != number.name]
         # Where the model lacks something, that may be what moves a number so far from its start.
         silent = conflict or "the recordings are hardly sensitive to this parameter"
@@ -853,7 +889,8 @@ def estimate_of(fitted: Fit, row: int, recordings: Sequence[str], conflict: str)
         verdict = "at its bound"
         why = f"the recordings favour a value at or beyond {shown_text(bound, number.unit)}"
     elif width >= UNKNOWN or is_part:
-        verdict, why = "not identifiable", f"{why}; the interval includes zero or twice the value"
+        verdict = "not identifiable"
+        why = f"{why}; the interval includes zero or twice the value"
     elif conflict and not text:
         # Said of every number: which of them the missing physics moves is not known.
         why = conflict
@@ -864,5 +901,6 @@ def estimate_of(fitted: Fit, row: int, recordings: Sequence[str], conflict: str)
         cut = [bound for bound, end in ends if abs(end - bound) <= _AT_BOUND * abs(end)]
         why += f"; the interval ends at its bound, {shown_text(cut[0], number.unit)}" if cut else ""
     why = f"{text}; {why}." if text else why
-    size, confidence = number.size, fitted.confidence
+    size = number.size
+    confidence = fitted.confidence
     return Estimate(number.name, value, number.unit, low, high, verdict, why, tuple(recordings), confidence, size)

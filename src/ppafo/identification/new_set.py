@@ -59,7 +59,8 @@ def with_estimates(parameter_set: ParameterSet, estimates: Iterable[Estimate], v
         used[estimate.path] = estimate
         # In the unit of the earlier entry.
         before = parameter_set.numbers.get(estimate.path)
-        unit, ends = quantity.unit if before is None else before.unit, (estimate.value, estimate.low, estimate.high)
+        unit = quantity.unit if before is None else before.unit
+        ends = (estimate.value, estimate.low, estimate.high)
         value, low, high = (_in_unit(unit, end, quantity, parameter_set) for end in ends)
         previous = "no value" if before is None else f"{entry_text(before)} ({before.origin}: {before.source})"
         said = f"{100.0 * estimate.confidence:g}% interval {low:.6g} to {high:.6g} {unit}".rstrip()
@@ -118,7 +119,8 @@ def stated_half_width(entry: Entry, quantity: Quantity) -> float:
 
 def in_set_unit(number: float, path: str, si_unit: str, parameter_set: ParameterSet) -> tuple[float, str]:
     """Return a value [SI] and its unit for display: those of its entry in the set, or the display unit without one."""
-    entry, quantity = parameter_set.numbers.get(path), parameter_set.declarations().get(path)
+    entry = parameter_set.numbers.get(path)
+    quantity = parameter_set.declarations().get(path)
     if entry is None or quantity is None or entry.unit == si_unit:
         return in_shown_unit(number, si_unit)
     return _in_unit(entry.unit, number, quantity, parameter_set), entry.unit

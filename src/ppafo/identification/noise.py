@@ -46,13 +46,16 @@ def burg(series: Sequence[Floats], highest: int = HIGHEST_ORDER, wanted_order: i
     most one coefficient per 100 samples: with more, the misfit of a wrong law would pass for noise in the few readings
     of a bench. Correlated noise in shorter series is therefore not detected, and intervals are too narrow there.
     """
-    forward, backward = list(series), list(series)
-    count, shortest = sum(map(len, series)), min(map(len, series))
+    forward = list(series)
+    backward = list(series)
+    count = sum(map(len, series))
+    shortest = min(map(len, series))
     power = 1.0
     coefficients = []
     best = (0.0, 0)
     for order in range(1, min(highest, count // SAMPLES_PER_COEFFICIENT, shortest - 2) + 1):
-        ahead, behind = [errors[1:] for errors in forward], [errors[:-1] for errors in backward]
+        ahead = [errors[1:] for errors in forward]
+        behind = [errors[:-1] for errors in backward]
         across = sum(float(np.sum(a * b)) for a, b in zip(ahead, behind, strict=True))
         size = sum(float(np.sum(a * a + b * b)) for a, b in zip(ahead, behind, strict=True))
         # Residuals of 0 throughout, of a law without noise, have no memory.
@@ -75,7 +78,8 @@ def noise_of(
     The random walk is tried only if sensors ``may_drift``; an autoregression would need many coefficients for slow
     drift. Columns are summed in power, as in ``burg``. With ``like``, order and gain are those of that model.
     """
-    count, size = sum(map(len, series)), sum(float(np.square(values).sum()) for values in series)
+    count = sum(map(len, series))
+    size = sum(float(np.square(values).sum()) for values in series)
     # Residuals below the floor are the engine's, and no noise.
     if size < 0.5 * count:
         return Noise(1.0)
@@ -93,9 +97,11 @@ def noise_of(
         # With ever less gain the innovations fall, and grow again: what follows is larger still.
         if innovation > previous:
             break
-        previous, criterion = innovation, 2.0 * count * math.log(innovation) + 2.0
+        previous = innovation
+        criterion = 2.0 * count * math.log(innovation) + 2.0
         if criterion < best:
-            best, noise = criterion, Noise(1.0, (), gain, innovation)
+            best = criterion
+            noise = Noise(1.0, (), gain, innovation)
     return noise
 
 
@@ -109,7 +115,8 @@ def whiten(values: Floats, noise: Noise) -> Floats:
     forward = values / noise.deviation
     if noise.gain > 0.0:
         return _without_level(forward, noise.gain) / noise.innovation
-    backward, power = forward.copy(), 1.0
+    backward = forward.copy()
+    power = 1.0
     innovations = forward.copy()
     for order, coefficient in enumerate(noise.reflection, start=1):
         forward, backward = forward[1:] - coefficient * backward[:-1], backward[:-1] - coefficient * forward[1:]

@@ -161,7 +161,9 @@ def load_problem(path: str | Path) -> ProblemFile:
 
     Raises IdentificationError for an invalid file, and for recordings that are not there.
     """
-    file, content, folder = label(str(path)), _FILE.read(path), Path(path).parent
+    file = label(str(path))
+    content = _FILE.read(path)
+    folder = Path(path).parent
     problem = checked_record(ProblemFile, _FILE.parse(content, file), file, IdentificationError, content)
     # Each may be left out, which the layout allows, but not both.
     if not problem.procedure and problem.trajectory is None:

@@ -74,7 +74,8 @@ def with_tried_units(
     atmosphere = atmospheric_pressure(context.parameter_set)
     pressures = tuple(name for name, channel in channels.items() if channel.unit == "Pa")
     # Accusations first, then the least scatter.
-    first, found = (True, math.inf), result
+    first = (True, math.inf)
+    found = result
     # All absolute pressures together, then each one.
     for names in dict.fromkeys((pressures, *((name,) for name in (*pressures, *others)))):
         unit = channels[names[0]].unit.removesuffix("_d") if names else ""
@@ -155,7 +156,8 @@ def read_tasks(
     tasks = []
     used = []
     for number, procedure in enumerate(procedures, start=1):
-        kind, gas = procedure.kind, getattr(procedure, "gas", None)
+        kind = procedure.kind
+        gas = getattr(procedure, "gas", None)
         row_time = _ROW_TIME if kind in procedure.steady else None
         # Steady readings have no times: each counts by itself.
         first, last = (getattr(procedure, name, None) for name in ("start", "end"))

@@ -97,7 +97,8 @@ class RecordingReader(NamedTuple):
         ``row_time`` [s] is the time between the rows of a table of text, or of a column map, without a time column;
         None requires the column. ``gas`` is the gas of volume flows.
         """
-        path, atmosphere = self.folder / name, atmospheric_pressure(self.parameter_set)
+        path = self.folder / name
+        atmosphere = atmospheric_pressure(self.parameter_set)
         if columns is None:
             is_text = path.suffix.lower() in TEXT_SUFFIXES and not (path.parent / RUN_FILE).exists()
             if row_time is not None and is_text:
@@ -137,7 +138,8 @@ def double_use(uses: Iterable[UsedRecording]) -> str:
     Recordings are compared by their numbers, independent of file names.
     """
     for use, other in combinations(uses, 2):
-        first, second = use.recording, other.recording
+        first = use.recording
+        second = other.recording
         is_other_procedure = use.kind and other.kind and use.kind != other.kind
         shares = not (use.channels and other.channels) or bool(use.channels & other.channels)
         is_at_once = use.first < other.last and other.first < use.last

@@ -42,9 +42,11 @@ def start_reversals(_course: ReferenceSummary, sample: Sample) -> Reversals:
 
 def update_reversals(state: Reversals, _course: ReferenceSummary, sample: Sample) -> Reversals:
     """Update the reversal meter: count a change of direction within the task."""
-    command, task = sample.command, sample.stride.phase
+    command = sample.command
+    task = sample.stride.phase
     begins = task != state.task or command > VENTS_ABOVE
-    before, now = 0.0 if begins else state.way, direction_of(command)
+    before = 0.0 if begins else state.way
+    now = direction_of(command)
     return Reversals(now if now != 0.0 else before, task, state.turns + (1.0 if before * now < 0.0 else 0.0))
 
 
@@ -94,7 +96,8 @@ def update_requested_torque(
     state: _RequestedTorqueSums, _course: ReferenceSummary, sample: Sample
 ) -> _RequestedTorqueSums:
     """Update the sums of requested torque with a sample, if a torque is requested."""
-    error, counts = sample.reference - sample.torque, is_torque_requested(sample.command, sample.stride.phase)
+    error = sample.reference - sample.torque
+    counts = is_torque_requested(sample.command, sample.stride.phase)
     return _RequestedTorqueSums(
         state.squares + (error * error if counts else 0.0),
         state.requested + (sample.reference * sample.reference if counts else 0.0),

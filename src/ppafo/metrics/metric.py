@@ -204,7 +204,8 @@ def extent(recording: Recording) -> float:
 
 def hold_start(recording: Recording) -> int | None:
     """Return the first sample of the final hold of a reference; None without a hold."""
-    reference, tolerance = reference_of(recording), SAME_LEVEL * extent(recording)
+    reference = reference_of(recording)
+    tolerance = SAME_LEVEL * extent(recording)
     away = np.flatnonzero(np.abs(reference - reference[-1]) > tolerance)
     first = int(away[-1]) + 1 if away.size else 0
     # One sample at rest has no time over which a mean could be taken.

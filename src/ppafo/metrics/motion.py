@@ -86,7 +86,8 @@ def read_time_of_fraction(readings: Readings, fraction: float) -> Floats:
     # The first True of each run; where nothing moves all are nan, and so is the time.
     after = np.argmax(done >= fraction, axis=0)
     runs = np.arange(after.size)
-    before, reached = done[after - 1, runs], done[after, runs]
+    before = done[after - 1, runs]
+    reached = done[after, runs]
     part = (fraction - before) / (reached - before)
     return np.asarray((after - 1 + part) * readings.interval)
 

@@ -193,10 +193,13 @@ def numbers_of(
     ``interval`` [s] is that of the samples, ``turns`` the least number of reversals of the error by a lag.
     """
     inverse = 1.0 / part.taken if part.taken > 0.0 else math.nan
-    mean, square, mean_ahead = part.total * inverse, part.squares * inverse, part.reference_total * inverse
+    mean = part.total * inverse
+    square = part.squares * inverse
+    mean_ahead = part.reference_total * inverse
     rests = 1.0 if part.rests > 0.0 or part.path == 0.0 else 0.0
     of_lag = 0.0 if rests > 0.0 else max(abs(part.lag_swing.turns) - 1.0, turns, 0.0)
-    lag, way = math.sqrt(part.lag_squares * inverse), abs(part.last - part.first)
+    lag = math.sqrt(part.lag_squares * inverse)
+    way = abs(part.last - part.first)
     wave = math.sqrt(max(part.reference_squares * inverse - mean_ahead * mean_ahead, 0.0))
     # On a quick ramp every loop is behind: the error of a move counts less.
     inverse_path = 1.0 / (part.path if part.path > 0.0 else 1.0)
@@ -315,7 +318,8 @@ class SettledSums(NamedTuple):
 
 def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
     """Start the settled meter at the first sample."""
-    value, reference = sample.value, sample.reference
+    value = sample.value
+    reference = sample.reference
     error = value - reference
     return SettledSums(
         part=PartSums(
@@ -377,7 +381,9 @@ def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, late
 
     ``late`` is the lead of the reference over a late one, ``lag`` what is allowed of that.
     """
-    before, error, reference = state.part, sample.value - sample.reference, sample.reference
+    before = state.part
+    error = sample.value - sample.reference
+    reference = sample.reference
     # From the initial value, or the square of a pressure would hide its change.
     ahead = reference - state.begun
     is_first = course.part_start == 0.0 and course.rests == 0.0
@@ -422,7 +428,8 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
     lagged = state.lagged + (sample.reference - state.lagged) * course.interval / (LAG_TIME + course.interval)
     late = sample.reference - lagged
     lag = allowed_lag(course, late, sample.reference - before.last, sample.angular_velocity)
-    part, command = next_part(state, course, sample, late, lag), update_reversals(state.command, course, sample)
+    part = next_part(state, course, sample, late, lag)
+    command = update_reversals(state.command, course, sample)
     return SettledSums(
         part=part,
         before=state.before,
@@ -453,7 +460,8 @@ def blended_swing(first: Swing, rest: Swing, of_first: float) -> Swing:
 def blend(first: PartSums, rest: PartSums, of_first: float) -> PartSums:
     """Return the sums with which a move after a rest begins: a share ``of_first`` of a move and of that rest."""
     # Only the second half of a rest was judged; a small part of a path that returns counts in full.
-    of_rest, of_path = 2.0 * of_first, of_first * of_first * of_first
+    of_rest = 2.0 * of_first
+    of_path = of_first * of_first * of_first
     return PartSums(
         start=first.start if of_first > 0.0 else rest.end,
         since=first.since,
@@ -489,7 +497,8 @@ def worse(state: SettledSums, course: ReferenceSummary, part: PartSums, share: f
 
 def keep_worst(state: SettledSums, course: ReferenceSummary) -> SettledSums:
     """Before the first sample of a new part, end the one before; the move before a rest counts as much as the rest."""
-    ended, rests = state.part, state.part.rests > 0.0
+    ended = state.part
+    rests = state.part.rests > 0.0
     # At the start of a run the value may be on its way yet.
     is_late = ended.start > 0.0 or state.met > 0.0 or (course.start_up > 0.0 and ended.end > course.start_up)
     counts = is_late and (rests or ended.path > 0.0)

@@ -93,14 +93,17 @@ def totals_at(sample: StrideSample) -> _StrideTotals:
 
 
 def _start(_course: ReferenceSummary, sample: Sample) -> StrideMeter:
-    gas, no_sums = sample.stride.supplied_mass, _StrideTotals(0.0, 0.0, 0.0, 0.0, 0.0)
+    gas = sample.stride.supplied_mass
+    no_sums = _StrideTotals(0.0, 0.0, 0.0, 0.0, 0.0)
     return StrideMeter(
         sample.stride.strides, gas, gas, 0.0, 0.0, totals_at(sample.stride), 0.0, 0.0, 0.0, 0.0, no_sums, 0.0, 0.0
     )
 
 
 def _update(state: StrideMeter, _course: ReferenceSummary, sample: Sample) -> StrideMeter:
-    at_strike, at_end, sums = state.at_strike, totals_at(sample.stride), state.sums
+    at_strike = state.at_strike
+    at_end = totals_at(sample.stride)
+    sums = state.sums
     # Counts are floats in the state of a run: half way between two of them is safe from rounding.
     is_strike = sample.stride.strides - state.strikes > 0.5
     # In the first strides the controller still learns their time.
@@ -115,7 +118,8 @@ def _update(state: StrideMeter, _course: ReferenceSummary, sample: Sample) -> St
         toe_clearance=sums.toe_clearance + (at_end.toe_clearance - at_strike.toe_clearance),
         toe_landing=sums.toe_landing + state.on_toes,
     )
-    error, pushes = sample.reference - sample.torque, sample.stride.phase == PUSH_OFF
+    error = sample.reference - sample.torque
+    pushes = sample.stride.phase == PUSH_OFF
     return StrideMeter(
         strikes=sample.stride.strides,
         first_gas=state.first_gas,

@@ -47,7 +47,8 @@ def switchings(recording: Recording) -> float:
     """Number of commanded state changes of both valves."""
     # As ``ordered_positions`` says it of one command.
     command = recording["command"]
-    positions_a, positions_b = (command > SHUT) & (command < VENTS_ABOVE), command < -SHUT
+    positions_a = (command > SHUT) & (command < VENTS_ABOVE)
+    positions_b = command < -SHUT
     return float(np.count_nonzero(np.diff(positions_a)) + np.count_nonzero(np.diff(positions_b)))
 
 
@@ -58,7 +59,8 @@ def reversals(values: Floats, swing: float) -> int:
     signal has no reversal.
     """
     # No way yet: the first swing, up or down, is no reversal.
-    count, direction = 0, 0
+    count = 0
+    direction = 0
     lowest = highest = float(values[0])
     # The first and the last value, and each between them at which the signal turns back: the rest decide nothing.
     moving = values[np.flatnonzero(np.diff(values, prepend=np.nan))]
@@ -68,17 +70,21 @@ def reversals(values: Floats, swing: float) -> int:
     for value in moving.tolist():
         if direction >= 0 and value < highest - swing:
             count += direction
-            direction, lowest = -1, value
+            direction = -1
+            lowest = value
         elif direction <= 0 and value > lowest + swing:
             count -= direction
-            direction, highest = 1, value
-        lowest, highest = min(lowest, value), max(highest, value)
+            direction = 1
+            highest = value
+        lowest = min(lowest, value)
+        highest = max(highest, value)
     return count
 
 
 def oscillations(recording: Recording, part_of: Callable[[Recording], slice | None]) -> float | None:
     """Number of reversals above 5 % of the reference extent in a part of a task; None without that part."""
-    part, largest = part_of(recording), extent(recording)
+    part = part_of(recording)
+    largest = extent(recording)
     # Without a reference there is nothing that the smallest swing could be a fraction of.
     if part is None or largest == 0.0:
         return None

@@ -36,7 +36,8 @@ def rms_error(recording: Recording, part_of: Callable[[Recording], slice | None]
     if part is None:
         return None
     # Over time and not over samples: a recording may have more of them where more happens.
-    time, error = recording.time[part], error_of(recording)[part]
+    time = recording.time[part]
+    error = error_of(recording)[part]
     return float(np.sqrt(np.trapezoid(error**2, time) / float(time[-1] - time[0])))
 
 

@@ -96,7 +96,8 @@ def built(sources: Mapping[str, bytes]) -> bytes:
     """Return the module of ``module.c`` and the files beside it; raises ProgramError where it cannot be built."""
     line = [*compiler(), *_FLAGS, "module.c", "-o", "module.wasm"]
     with temporary_folder("ppafo", sources) as folder:
-        done, made = asked(line, _REMEDY, folder, Path(folder)), Path(folder) / "module.wasm"
+        done = asked(line, _REMEDY, folder, Path(folder))
+        made = Path(folder) / "module.wasm"
         if done.returncode != 0 or not made.is_file():
             raise ProgramError(f"the WebAssembly module could not be built: {complaint(done)}")
         return made.read_bytes()
@@ -158,8 +159,10 @@ def workbench(
 def _simulation(name: str, overrides: Sequence[str], sliders: Sequence[str]) -> dict[str, Any]:
     """Return all that the page needs of a scenario, as plain data for JSON."""
     scenario = load_scenario(name, overrides)
-    library, recording = library_of(scenario), simulate(scenario).recording
-    outputs, metrics = library.program.outputs, library.program.metrics
+    library = library_of(scenario)
+    recording = simulate(scenario).recording
+    outputs = library.program.outputs
+    metrics = library.program.metrics
     compared = [output for output in outputs if output in recording.names]
     drawn = {name: OUTPUTS[name] for name in outputs}
     if "reference" in outputs:
@@ -246,19 +249,23 @@ def _slider(setting: ExportParameter, atmosphere: float, absent: Collection[str]
     value, low, high = (
         (number - zero) / float(shown["scale"]) for number in (setting.value, quantity.minimum, quantity.maximum)
     )
-    size, step = _round_up(2.5 * abs(value)) if value else 1.0, 0.0
+    size = _round_up(2.5 * abs(value)) if value else 1.0
+    step = 0.0
     if setting.path == "controller.period":
         # Other periods may have samples between steps, which is another program.
         low = step = sample / float(shown["scale"])
         size = max(size, 20.0 * step)
     if setting.path == "run.duration":
         size = high = _LONGER * value
-    start, end = max(low, -size if value < 0.0 else 0.0), min(high, size)
-    start, end = min(start, value), max(end, value)
+    start = max(low, -size if value < 0.0 else 0.0)
+    end = min(high, size)
+    start = min(start, value)
+    end = max(end, value)
     step = step or _round_up((end - start) / 250.0)
     if not quantity.minimum_allowed and start <= low:
         start = low + step
-    is_hidden, is_length = setting.path in _HIDDEN or setting.name in absent, setting.path == "run.duration"
+    is_hidden = setting.path in _HIDDEN or setting.name in absent
+    is_length = setting.path == "run.duration"
     return {**shown, "from": start, "to": end, "step": step, "hidden": is_hidden, "longest": is_length}
 
 

@@ -106,7 +106,8 @@ def read_measured_volumes(path: Path) -> MeasuredVolumes:
         columns[name] = column
         step = _step([Decimal(cells[index]) for _, cells in rows])
         digits[name] = abs(to_si(step, unit, declared.unit, 0.0) - to_si(0.0, unit, declared.unit, 0.0))
-    angles, pressures = np.unique(columns["angle"]), np.unique(columns["pressure"])
+    angles = np.unique(columns["angle"])
+    pressures = np.unique(columns["pressure"])
     # Refusals are in the units of the table.
     with shown_in(counted_from({COLUMNS[name].unit: unit for name, unit in units.items()}, 0.0)):
         _check_grid(columns["angle"], columns["pressure"], file)
@@ -143,7 +144,8 @@ def _units(header: Sequence[str], file: str) -> dict[str, str]:
     for cell in header:
         name, bracket, unit = (part.strip() for part in cell.strip().removesuffix("]").partition("["))
         if name not in COLUMNS:
-            shown, hint = one_line(name)[:LONGEST], nearest_name(name, COLUMNS)
+            shown = one_line(name)[:LONGEST]
+            hint = nearest_name(name, COLUMNS)
             hint = "; how volumes follow from torques is in docs/how-to/extend.md" if "torque" in name.lower() else hint
             raise ParameterError(f"{file}: unknown column '{shown}'{hint}; allowed: {', '.join(COLUMNS)}")
         if name in units:
@@ -168,7 +170,8 @@ def _check_grid(angle: Floats, pressure: Floats, file: str) -> None:
 
     The number of angles and pressures is limited, and the volumes at zero pressure are required.
     """
-    angles, pressures = np.unique(angle), np.unique(pressure)
+    angles = np.unique(angle)
+    pressures = np.unique(pressure)
     if angles.size < 2:
         raise ParameterError(f"{file}: has one angle only; at least 2 angles are needed")
     if pressures[0] <= -STANDARD_ATMOSPHERE:
@@ -283,7 +286,8 @@ def fitted_chambers(measured: MeasuredVolumes) -> list[FittedVolumes]:
     shares = (measured.angles - measured.angles[0]) / (measured.angles[-1] - measured.angles[0])
     found = [within_resolution(measured.volume_1, shares, measured.pressures, measured.resolution_1)]
     if measured.volume_2 is not None:
-        turned, falling = 1.0 - shares[::-1], measured.volume_2[::-1]
+        turned = 1.0 - shares[::-1]
+        falling = measured.volume_2[::-1]
         found.append(within_resolution(falling, turned, measured.pressures, measured.resolution_2))
     return found
 
@@ -315,7 +319,8 @@ def within_resolution(volume: Floats, shares: Floats, pressures: Floats, resolut
 
         size = volume.size
         # In last digits. A little more than 0, for the solver is exact to 1e-7.
-        limits, moved = found / resolution - _CLEAR, ((fitted - volume) / resolution).ravel()
+        limits = found / resolution - _CLEAR
+        moved = ((fitted - volume) / resolution).ravel()
         # Each move is the difference of two numbers of 0 or more, of which the sum is least.
         solved = linprog(
             np.ones(2 * size),
@@ -351,7 +356,8 @@ def _likeliest(
     third = np.cumsum(to_coefficients[3:], axis=0) * np.sqrt(lengths)[:, None]
     roughness, modes = np.linalg.eigh(third.T @ third)
     # Parabolas are smooth.
-    rough, amplitudes = roughness[3:], modes.T @ volume
+    rough = roughness[3:]
+    amplitudes = modes.T @ volume
     squares = np.square(amplitudes[3:]).sum(axis=1)
     variances = np.geomspace(1.0e-6, 1.0e6, 121)[:, None] * noise**2 * np.median(rough) / rough
     totals = noise**2 + variances
@@ -383,7 +389,8 @@ def _chamber(volume: Floats, pressures: Floats, shares: Floats) -> TabulatedCham
 def _curve(values: Floats, shares: Floats) -> Curve:
     """Return the cubic spline through values (angles,) with not-a-knot end conditions."""
     coefficients = np.linalg.solve(_basis(shares, shares[2:-2])[:, : values.size], values).tolist()
-    powers, bends = coefficients[:_POWERS], coefficients[_POWERS:]
+    powers = coefficients[:_POWERS]
+    bends = coefficients[_POWERS:]
     return Curve((*powers, *[0.0] * (_POWERS - len(powers))), (*bends, *[0.0] * (BENDS - len(bends))))
 
 
@@ -398,7 +405,8 @@ def _basis(shares: Floats, bends: Floats) -> Floats:
 
 def _check_curves(chamber: TabulatedChamber, bends: Floats, angles: Floats, name: str, file: str) -> None:
     """Raise ParameterError if a curve of a chamber becomes negative between the measured angles."""
-    basis, curves = _basis(_CHECKED_SHARES, bends), (chamber.lowest, *(rise.gain for rise in chamber.rises))
+    basis = _basis(_CHECKED_SHARES, bends)
+    curves = (chamber.lowest, *(rise.gain for rise in chamber.rises))
     found = [basis @ np.array([*curve.powers, *curve.bends[: bends.size]]) for curve in curves]
     # Twice what is left as it is: there the same numbers are summed in another order.
     rounding = 2.0 * _ROUNDING * float(np.abs(sum(found)).max())

@@ -96,22 +96,27 @@ def read_device(parameter_set: ParameterSet, name: str, links: Graph) -> Device:
         )
     named = {path.split(".")[1] for path in parameter_set.numbers if path.startswith(f"{SECTION}.")}
     of_effects = {EFFECTS[effect].section: EFFECTS[effect].quantities for effect in sorted(named)}
-    atmosphere, declared = atmospheric_pressure(parameter_set), parameter_set.declarations()
+    atmosphere = atmospheric_pressure(parameter_set)
+    declared = parameter_set.declarations()
     sections: dict[str, dict[str, float]] = {}
     for section, quantities in (needed_quantities(parameter_set, name) | of_effects).items():
         sections[section] = {}
         for quantity in quantities:
             path = f"{section}.{quantity.name}"
-            entry, number = parameter_set.numbers.get(path), quantity.default or 0.0
+            entry = parameter_set.numbers.get(path)
+            number = quantity.default or 0.0
             if entry is not None:
                 written = f"{parameter_set.file}: {path} = {entry_text(entry)}"
                 number = allowed_number(written, entry, declared[path], atmosphere)
             sections[section][quantity.name] = number
-    relieving, has_one_chamber = parameter_set.texts.get(declaration.RELIEVING_PATH), parameter_set.has_one_chamber
+    relieving = parameter_set.texts.get(declaration.RELIEVING_PATH)
+    has_one_chamber = parameter_set.has_one_chamber
     if has_one_chamber:
         # The port of the second chamber is at the atmosphere and passes nothing.
         sections["supply"]["dorsiflexion_pressure"] = sections["supply"]["atmospheric_pressure"]
-    moves, kind, sizes = ACTUATORS[parameter_set.actuator_kind], parameter_set.valve_kinds[name], sections["actuator"]
+    moves = ACTUATORS[parameter_set.actuator_kind]
+    kind = parameter_set.valve_kinds[name]
+    sizes = sections["actuator"]
     return Device(
         name=parameter_set.name,
         gas=Gas(species, **sections["gas"]),
@@ -175,7 +180,8 @@ def contradictions(device: Device, stated: ParameterSet | None = None) -> Iterat
 
     Numbers are shown as the set that ``stated`` them has them. Later problems rely on earlier ones.
     """
-    actuator, stops = device.actuator, ("actuator.angle_min", "actuator.angle_max")
+    actuator = device.actuator
+    stops = ("actuator.angle_min", "actuator.angle_max")
     for path, relation, other in consistency(device):
         own = tuple(re.sub("^valve[.]", f"valves.{device.valve_name}.", name) for name in (path, other))
         pair = [number_under(device, name.split(".")) for name in (path, other)]
@@ -214,7 +220,8 @@ def _rule_line(device: Device, stated: ParameterSet | None, path: str, pair: Seq
 
 def _shape_problem(actuator: Actuator) -> Problem:
     """Return the problem of actuator numbers that contradict each other although each is in range."""
-    kind, table = ACTUATORS[actuator.kind], actuator.table
+    kind = ACTUATORS[actuator.kind]
+    table = actuator.table
     if kind.problem is None and table is None:
         return False, str
     numbers = {**{name: getattr(actuator, name) for name in Range._fields}, **actuator.settings}
@@ -226,7 +233,8 @@ def _shape_problem(actuator: Actuator) -> Problem:
         problem = (
             "" if kind.problem is None else kind.problem(replace(actuator, **stops._asdict(), settings=single), stops)
         )
-        low, high = stops.angle_min + SAME_STOP, stops.angle_max - SAME_STOP
+        low = stops.angle_min + SAME_STOP
+        high = stops.angle_max - SAME_STOP
         if not problem and table is not None and not (table.first_angle <= low and high <= table.last_angle):
             measured, wanted = (
                 f"{math.degrees(first):.4g} to {math.degrees(last):.4g} deg"
@@ -242,19 +250,25 @@ def _shape_problem(actuator: Actuator) -> Problem:
 
 def _beyond_pressures(device: Device) -> Problem:
     """Return the problem of a supply outside the measured pressures of a volume table; elementwise over runs."""
-    table, supply = device.actuator.table, device.supply
+    table = device.actuator.table
+    supply = device.supply
     if table is None:
-        lowest, highest = -math.inf, math.inf
+        lowest = -math.inf
+        highest = math.inf
     else:
         from ppafo.parameters.actuator_table import measured_pressures
 
         lowest, highest = measured_pressures(table)
     if supply.is_vacuum:
         gauge = smaller(supply.pressure, supply.dorsiflexion_pressure) - supply.atmospheric_pressure
-        is_beyond, way, end = gauge < COVERED_PRESSURE * lowest, "down", lowest
+        is_beyond = gauge < COVERED_PRESSURE * lowest
+        way = "down"
+        end = lowest
     else:
         gauge = larger(supply.pressure, supply.dorsiflexion_pressure) - supply.atmospheric_pressure
-        is_beyond, way, end = gauge > COVERED_PRESSURE * highest, "up", highest
+        is_beyond = gauge > COVERED_PRESSURE * highest
+        way = "up"
+        end = highest
 
     def line(run: int) -> str:
         atmosphere = at(supply.atmospheric_pressure, run)
@@ -293,7 +307,8 @@ def needed_quantities(parameter_set: ParameterSet, valve: str) -> dict[str, tupl
         }
     else:
         sections["actuator.leak"] = orifice_form(parameter_set, "actuator.leak")
-    form, kind = orifice_form(parameter_set, f"valves.{valve}"), parameter_set.valve_kinds[valve]
+    form = orifice_form(parameter_set, f"valves.{valve}")
+    kind = parameter_set.valve_kinds[valve]
     return sections | {f"valves.{valve}": form + VALVES[kind].quantities}
 
 
@@ -315,7 +330,8 @@ def consistency(device: Device) -> Iterator[tuple[str, str, str]]:
     yield "actuator.angle_min", "below", "actuator.angle_max"
     yield "friction.dynamic_torque", "at most", "friction.static_torque"
     # Of two supplies on either side of the atmosphere both would turn the joint one way.
-    supply, room = device.supply, first(device.supply.atmospheric_pressure)
+    supply = device.supply
+    room = first(device.supply.atmospheric_pressure)
     is_suction = supply.is_vacuum and max(first(supply.pressure), first(supply.dorsiflexion_pressure)) <= room
     for path in SUPPLIES:
         yield path, "at most" if is_suction else "at least", ATMOSPHERE_PATH
@@ -323,7 +339,8 @@ def consistency(device: Device) -> Iterator[tuple[str, str, str]]:
         yield "valve.lowest_pressure", "below", "valve.highest_pressure"
         yield "valve.lowest_pressure", "at least", ATMOSPHERE_PATH
     # Of a table of openings commands rise, and openings do not fall.
-    table, path = device.effects.get("opening", {}), f"{SECTION}.opening"
+    table = device.effects.get("opening", {})
+    path = f"{SECTION}.opening"
     used = [name[-2:] for name, command in table.items() if name.startswith("command") and first(command) > 0.0]
     for before, after in itertools.pairwise(used):
         yield f"{path}.command_{before}", "below", f"{path}.command_{after}"

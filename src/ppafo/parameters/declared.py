@@ -170,7 +170,8 @@ def _joined(path: str, name: str) -> str:
 
 def number_in(value: Any, quantity: Quantity, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
     """Return a value of a file in the quantity's SI unit. Raises UnitError with the reason for an unusable one."""
-    is_text, unit = isinstance(value, str), quantity.unit
+    is_text = isinstance(value, str)
+    unit = quantity.unit
     # True and false are whole numbers to Python.
     if quantity.whole and (isinstance(value, bool) or not isinstance(value, int)):
         raise UnitError("must be a whole number")
@@ -265,7 +266,8 @@ class FieldLayout:
             yield path, f"{path} = {quote(value)} must be a table{keys}{words}"
         elif isinstance(field, Many) and field.holds(value):
             for name, item in value.items() if field.keys else enumerate(value, 1):
-                at, of = f"{path}.{one_line(name)}", field.of
+                at = f"{path}.{one_line(name)}"
+                of = field.of
                 if field.keys and not (isinstance(name, str) and re.fullmatch(field.keys, name)):
                     yield at, f"{path}: the name {quote(name)} {RULES[field.keys]}"
                     continue
@@ -308,7 +310,8 @@ class FieldLayout:
             known = field.allowed if isinstance(value, str) else tuple(field.allowed)
             if not isinstance(value, bool | float | list | dict) and value in known:
                 return ""
-            names, is_kind = [str(name) for name in field.allowed], path.rpartition(".")[2] == KIND
+            names = [str(name) for name in field.allowed]
+            is_kind = path.rpartition(".")[2] == KIND
             # All are listed: a word that is only somewhat alike says less.
             hint = nearest_kind(str(value), names) if is_kind else nearest_name(str(value), names, 0.75)
             hint = ", without quotation marks" if str(value) in names else hint
@@ -358,7 +361,8 @@ def _table_schema(
 ) -> dict[str, Any]:
     """Return the schema of a table as a reference to one of the ``definitions``, for a ``kind`` to one of each kind."""
     fields = declare(document)
-    kind, chosen = fields.get(_joined(path, KIND)), kind_at(document, path)
+    kind = fields.get(_joined(path, KIND))
+    chosen = kind_at(document, path)
     if isinstance(kind, Words) and chosen not in kind.allowed:
         forms = []
         for name in kind.allowed:

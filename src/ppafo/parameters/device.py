@@ -240,7 +240,8 @@ class Device:
     @property
     def highest_pressures(self) -> tuple[Any, Any]:
         """Highest pressures that the chambers can be filled to [Pa absolute]; a regulator may be set no higher."""
-        supplies, highest = (self.supply.pressure, self.supply.dorsiflexion_pressure), self.valve.settings
+        supplies = (self.supply.pressure, self.supply.dorsiflexion_pressure)
+        highest = self.valve.settings
         if VALVES[self.valve.kind].regulation is None:
             return supplies
         return smaller(supplies[0], highest["highest_pressure"]), smaller(supplies[1], highest["highest_pressure"])
@@ -248,7 +249,8 @@ class Device:
     @property
     def lowest_pressure(self) -> Any:
         """Lowest pressure that a supply above the atmosphere lets a chamber fall to [Pa absolute]."""
-        room, settings = self.supply.atmospheric_pressure, self.valve.settings
+        room = self.supply.atmospheric_pressure
+        settings = self.valve.settings
         return room if VALVES[self.valve.kind].regulation is None else larger(room, settings["lowest_pressure"])
 
     @property

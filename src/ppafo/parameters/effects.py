@@ -76,7 +76,8 @@ def effect_rows(device: Device, others: Sections = _NO_SECTIONS) -> tuple[Any, .
 
 def effect_row(effect: Effect, device: Device, others: Sections = _NO_SECTIONS) -> Any:
     """Return the parameter row of an effect, active or not; numbers are arrays (runs,) if varied."""
-    settings, prepare = settings_of(device, effect, others), effect.prepare
+    settings = settings_of(device, effect, others)
+    prepare = effect.prepare
     # Most effects compute with their settings as they are.
     if prepare is None:
         return effect.parameters(*settings.values())
@@ -84,7 +85,8 @@ def effect_row(effect: Effect, device: Device, others: Sections = _NO_SECTIONS) 
     seen = [(section, name) for section, names_of_section in names.items() for name in names_of_section]
 
     def prepared(*numbers: float) -> Any:
-        own, of_device = numbers[: len(settings)], numbers[len(settings) :]
+        own = numbers[: len(settings)]
+        of_device = numbers[len(settings) :]
         sections: dict[str, dict[str, float]] = {section: {} for section in names}
         for (section, name), number in zip(seen, of_device, strict=True):
             sections[section][name] = number

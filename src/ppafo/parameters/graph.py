@@ -149,7 +149,8 @@ def holding(graph: Graph, present: Mapping[str, Any]) -> dict[str, tuple[Link, .
     computed: dict[Any, Any] = {}
     for path, links in graph.items():
         for link in links:
-            number, followed = present[path], link.number(present.__getitem__, computed)
+            number = present[path]
+            followed = link.number(present.__getitem__, computed)
             # Exactly, unless two pressures were given: what follows was computed by this same link.
             is_held = np.isclose(number, followed, rtol=SAME_PRESSURE, atol=0.0) if link.when else number == followed
             if np.all(is_held):

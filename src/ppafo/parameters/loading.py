@@ -110,7 +110,8 @@ def load_parameter_set(parameter_set: str | Path, *, plugins: Plugins = ()) -> P
     >>> ppafo.load_parameter_set("ppafo2011").title
     'Portable powered ankle-foot orthosis, completed'
     """
-    content, file = FILE.read(parameter_set), label(str(parameter_set))
+    content = FILE.read(parameter_set)
+    file = label(str(parameter_set))
     return parse_parameter_set(content, file, Path(parameter_set).parent)
 
 
@@ -137,7 +138,8 @@ def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -
     parameter_set = _parameter_set(document, fields, file, folder or Path())
     # Refuses a default valve that the set does not have.
     chosen_valve(parameter_set, None)
-    numbers, known = parameter_set.numbers, parameter_set.declarations()
+    numbers = parameter_set.numbers
+    known = parameter_set.declarations()
     if parameter_set.has_one_chamber and (of_second := OF_SECOND_CHAMBER.intersection(numbers)):
         raise ParameterError(f"{file}: {WHY_ONE_CHAMBER}; remove {', '.join(sorted(of_second))}")
     for path, entry in numbers.items():
@@ -215,7 +217,8 @@ def _parameter_set(document: Mapping[str, Any], fields: Fields, file: str, folde
             numbers |= entries_of_opening(valve["opening"], folder, f"{file}: valves.{name}.opening")
             find_effects(numbers)
     actuator = _table(document, "actuator")
-    kind, table = actuator.get("kind", VANE), None
+    kind = actuator.get("kind", VANE)
+    table = None
     if "file" in actuator:
         # Imported late, since few devices have a measured actuator.
         from ppafo.model.actuators.table import Table as Measured
@@ -226,7 +229,8 @@ def _parameter_set(document: Mapping[str, Any], fields: Fields, file: str, folde
             is_read = ACTUATORS[kind].model.table is Measured
             table = read_actuator_table(folder / actuator["file"]) if is_read else None
     citation = document.get("citation")
-    parent, joint = document.get("parent", ""), ANKLE
+    parent = document.get("parent", "")
+    joint = ANKLE
     if words := document.get("joint"):
         positive = words["positive"]
         negative = words.get("negative") or OPPOSITES.get(positive)
@@ -293,7 +297,8 @@ def parameter_set_toml(parameter_set: ParameterSet) -> str:
         file = {"file": parameter_set.actuator_file} if parameter_set.actuator_file else {}
         lines += table_lines("actuator", {"kind": parameter_set.actuator_kind, **file})
     # Section by section, in the order in which the sections first occur.
-    entries, kinds_to_write = parameter_set.entries(), dict(parameter_set.valve_kinds)
+    entries = parameter_set.entries()
+    kinds_to_write = dict(parameter_set.valve_kinds)
     sections = list(dict.fromkeys(path.rpartition(".")[0] for path in entries))
     for path in sorted(entries, key=lambda path: sections.index(path.rpartition(".")[0])):
         valve = path.split(".")[1] if path.startswith("valves.") else ""

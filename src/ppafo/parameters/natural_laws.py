@@ -60,17 +60,21 @@ def actuator_departure(model: ActuatorModel, plant: Any) -> LawDeparture:
     shaft gets the work p dV of the gas. The pressures of a mass are those at which it fills the chambers, and the
     compliances are the growth of the volumes with the pressure.
     """
-    width, room = plant.angle_max - plant.angle_min, plant.atmospheric_pressure
-    gauge, turn = plant.supply_pressure - room, _STEP * width
+    width = plant.angle_max - plant.angle_min
+    room = plant.atmospheric_pressure
+    gauge = plant.supply_pressure - room
+    turn = _STEP * width
     push = _STEP * gauge
     found = []
     for fraction, pair in product(_ANGLES, _PRESSURES):
-        angle, pressures = plant.angle_min + fraction * width, [room + share * gauge for share in pair]
+        angle = plant.angle_min + fraction * width
+        pressures = [room + share * gauge for share in pair]
         place = f"at {math.degrees(angle):.4g} deg with {_kilopascals(pressures[0])} and {_kilopascals(pressures[1])}"
         before, after = (model.chambers(plant, angle + way, *pressures) for way in (-turn, turn))
         here = model.chambers(plant, angle, *pressures)
         for number in (0, 1):
-            less, more = ([*pressures], [*pressures])
+            less = [*pressures]
+            more = [*pressures]
             less[number], more[number] = pressures[number] - push, pressures[number] + push
             of_torque = (model.torque(plant, angle, *more) - model.torque(plant, angle, *less)) / (2.0 * push)
             of_volume = (after[number] - before[number]) / (2.0 * turn)
@@ -81,7 +85,8 @@ def actuator_departure(model: ActuatorModel, plant: Any) -> LawDeparture:
             )
             found.append((abs(of_torque - of_volume), abs(of_volume), text))
             wider = model.chambers(plant, angle, *more)[number] - model.chambers(plant, angle, *less)[number]
-            given, scale = here[2 + number], here[number] / abs(gauge)
+            given = here[2 + number]
+            scale = here[number] / abs(gauge)
             text = (
                 f"{place} chamber {number + 1} widens by {1e9 * wider / (2.0 * push):.4g} cm^3/kPa, but its compliance "
                 f"is {1e9 * given:.4g} cm^3/kPa"
@@ -104,9 +109,11 @@ def valve_departure(model: ValveModel, settings: Any, plant: Any) -> LawDepartur
     """
     if model.instant is None:
         return LawDeparture(0.0, "")
-    valve, room = model.prepare(settings), plant.atmospheric_pressure
+    valve = model.prepare(settings)
+    room = plant.atmospheric_pressure
     pressure = room + 0.5 * (plant.supply_pressure - room)
-    full, found = plant.valve_conductance * max(plant.supply_pressure, room), [LawDeparture(0.0, "")]
+    full = plant.valve_conductance * max(plant.supply_pressure, room)
+    found = [LawDeparture(0.0, "")]
     for command in _COMMANDS:
         state = model.state()
         time = 0.0
@@ -118,7 +125,8 @@ def valve_departure(model: ValveModel, settings: Any, plant: Any) -> LawDepartur
                 event = model.next_event(valve, state, command, time) if model.jumps else math.inf
                 part = min(end, event if event > time else end) - time
                 shown, state = model.advance(valve, state, command, time, part)
-                time, parts = time + part, parts + 1
+                time = time + part
+                parts = parts + 1
             ports = model.connect(plant, shown)
             flows.append([model.port_flow(pressure, port, plant.valve_curve)[0].total for port in ports])
         openings = model.instant(valve, model.settle(valve, state, command, time), command)
@@ -139,12 +147,17 @@ def effect_departure(effect: Effect, row: Any, plant: Any) -> LawDeparture:
 
     Friction, drag, an impact and the flow through a path take power and never give it.
     """
-    room, supply, middle = plant.atmospheric_pressure, plant.supply_pressure, 0.5 * (plant.angle_min + plant.angle_max)
-    rows, found = {effect.name: row}, [LawDeparture(0.0, "")]
+    room = plant.atmospheric_pressure
+    supply = plant.supply_pressure
+    middle = 0.5 * (plant.angle_min + plant.angle_max)
+    rows = {effect.name: row}
+    found = [LawDeparture(0.0, "")]
     if effect.state is not None:
-        start, now = effect.state.start, PlantSnapshot(middle, 0.0, room, room, 0.0, 0.0, 0.0)
+        start = effect.state.start
+        now = PlantSnapshot(middle, 0.0, room, room, 0.0, 0.0, 0.0)
         rows[effect.state_name] = effect.state.row() if start is None else start(row, now)
-    pairs, path = ((room, room), (supply, room), (supply, supply)), plant.valve_conductance
+    pairs = ((room, room), (supply, room), (supply, supply))
+    path = plant.valve_conductance
     for port, law in effect.laws.items():
         tried: list[tuple[tuple[float, ...], float, float]] = []
         # A law takes the parameters, the state, or both.
@@ -178,7 +191,8 @@ def effect_departure(effect: Effect, row: Any, plant: Any) -> LawDeparture:
 
 def broken_laws(device: Device) -> Iterator[str]:
     """Yield the departures of the user's kinds in a device, each with the name of its kind."""
-    actuator, valve = device.actuator.kind, device.valve.kind
+    actuator = device.actuator.kind
+    valve = device.valve.kind
     effects = [effect for effect in effects_of(device) if not EFFECTS.is_own(effect.name)]
     if ACTUATORS.is_own(actuator) and VALVES.is_own(valve) and not effects:
         return

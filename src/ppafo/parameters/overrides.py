@@ -276,7 +276,8 @@ def _nearest_value(override: Override, allowed: Sequence[str]) -> str:
 
 def _with_text(parameter_set: ParameterSet, path: str, override: Override) -> ParameterSet:
     """Return a set with another gas and its constants, or with relieving regulators or not."""
-    numbers, value = dict(parameter_set.numbers), override.text
+    numbers = dict(parameter_set.numbers)
+    value = override.text
     if path == RELIEVING_PATH and value not in ("true", "false"):
         raise ParameterError(f"override '{override}': must be true or false")
     if path == SPECIES_PATH:

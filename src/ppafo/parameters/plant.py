@@ -79,7 +79,8 @@ def plant_parameters(device: Device, external_torque: float = 0.0) -> PlantParam
 
 def shape_and_growth(device: Device) -> tuple[Any, Any]:
     """Shape of an actuator other than a vane, and mean growth of chamber 1 with angle [m^3/rad]."""
-    actuator, supply = device.actuator, device.supply
+    actuator = device.actuator
+    supply = device.supply
     kind = ACTUATORS[actuator.kind]
     model = kind.model
 
@@ -98,7 +99,9 @@ def shape_and_growth(device: Device) -> tuple[Any, Any]:
 
 def plant_with(device: Device, valve: Restriction, leak: Restriction, external_torque: float) -> PlantParameters:
     """Plant parameters of a device with given orifices and external torque [N m]."""
-    actuator, gas, supply = device.actuator, device.gas, device.supply
+    actuator = device.actuator
+    gas = device.gas
+    supply = device.supply
     return PlantParameters(
         gas_product=gas.specific_gas_constant * gas.temperature,
         torque_constant=actuator.torque_constant,

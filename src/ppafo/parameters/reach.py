@@ -26,7 +26,8 @@ StaticTorque = Callable[[float, float, float], float]
 
 def static_torque(device: Device) -> StaticTorque:
     """Return the static torque function of a device, for a single run."""
-    torque, plant = ACTUATORS[device.actuator.kind].model.torque, plant_parameters(device)
+    torque = ACTUATORS[device.actuator.kind].model.torque
+    plant = plant_parameters(device)
     return lambda angle, pressure_1, pressure_2: float(torque(plant, angle, pressure_1, pressure_2))
 
 
@@ -42,7 +43,8 @@ def torque_reach(device: Device, angle: float, torque: StaticTorque | None = Non
 def reaching_pressures(device: Device) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
     """Return the pressures of both chambers [Pa absolute] at the lowest and highest torque; arrays (runs,) too."""
     (highest_1, highest_2), vented = device.highest_pressures, device.lowest_pressure
-    of_1, of_2 = (highest_1, vented), (vented, highest_2)
+    of_1 = (highest_1, vented)
+    of_2 = (vented, highest_2)
     return (of_1, of_2) if device.supply.is_vacuum else (of_2, of_1)
 
 
@@ -57,8 +59,10 @@ def supply_for(device: Device, angle: float, torque: float) -> float | None:
     Chamber 1 raises the torque above the torque of the vented actuator, chamber 2 lowers it; with a vacuum the reverse.
     None if no supply up to ``HIGHEST_PRESSURE``, or no vacuum, gives the torque.
     """
-    own, vented = static_torque(device), float(device.lowest_pressure)
-    room, most = float(device.supply.atmospheric_pressure), device.valve.settings.get("highest_pressure", math.inf)
+    own = static_torque(device)
+    vented = float(device.lowest_pressure)
+    room = float(device.supply.atmospheric_pressure)
+    most = device.valve.settings.get("highest_pressure", math.inf)
     sign = 1.0 if torque > own(angle, vented, vented) else -1.0
     is_first = supply_that_moves(device, sign > 0.0) == PRESSURE_PATH
 
@@ -70,7 +74,8 @@ def supply_for(device: Device, angle: float, torque: float) -> float | None:
     farthest = _LOWEST_PRESSURE - room if device.supply.is_vacuum else HIGHEST_PRESSURE
     if not is_enough(farthest):
         return None
-    low, high = 0.0, farthest
+    low = 0.0
+    high = farthest
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if is_enough(middle) else (middle, high)

@@ -50,7 +50,8 @@ def keyed(declared: str | Field, default: Any = MISSING) -> Any:
 
 def read_record(kind: TomlKind, record: type[Record], name_or_path: str | Path) -> tuple[Record, str]:
     """Read a file by bundled name or path as a record. Returns the record and the label used in messages."""
-    file, content = label(str(name_or_path)), kind.read(name_or_path)
+    file = label(str(name_or_path))
+    content = kind.read(name_or_path)
     return checked_record(record, kind.parse(content, file), file, kind.error, content), file
 
 
@@ -73,7 +74,8 @@ def fields_of(record: Any) -> dict[str, Field]:
     """Return the fields that a record declares, by path; one with a default may be omitted."""
     found: dict[str, Field] = {}
     for name, (base, declared), default in _keys(record):
-        is_required, is_open = default is MISSING, isinstance(declared, Words) and not declared.pattern
+        is_required = default is MISSING
+        is_open = isinstance(declared, Words) and not declared.pattern
         mark = replace(declared, pattern=FILLED) if is_open and default not in (MISSING, "") else declared
         if "" in (records := _records(base)):
             found |= inside(name, fields_of(records[""]), mark.summary, is_required)
@@ -100,7 +102,8 @@ def _keys(record: Any) -> list[tuple[str, tuple[Any, Any], Any]]:
 
 def _parts(hint: Any) -> tuple[Any, Any]:
     """Return the type of a field without None, and its declaration: the outermost one of several."""
-    mark, base = None, hint
+    mark = None
+    base = hint
     while True:
         if get_origin(base) is Annotated:
             base, *marks = get_args(base)
@@ -160,7 +163,8 @@ def record_from(record: type[Record], table: Mapping[str, Any]) -> Record:
 
 def _value(base: Any, mark: Any, value: Any) -> Any:
     """Return a checked value as its field has it; a word in place of a number stands for 0."""
-    origin, kinds = get_origin(base), _records(base)
+    origin = get_origin(base)
+    kinds = _records(base)
     if isinstance(mark, Quantity):
         return 0.0 if value in mark.words else value if mark.whole else number_in(value, mark)
     if kinds and isinstance(value, Mapping):

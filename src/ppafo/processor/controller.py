@@ -44,7 +44,8 @@ def fixed_point_controller(scenario: Scenario) -> FixedPointController:
             f"{scenario.name}: controller.period = {period:.9g} s: must be a multiple of 0.125 ms on the processor, "
             f"at most {MOST_TICKS // 2 * TICK:.3g} s"
         )
-    law, run = FIXED_LAWS[scenario.controller.kind], plan_run(scenario)
+    law = FIXED_LAWS[scenario.controller.kind]
+    run = plan_run(scenario)
     if run.program.valve.regulates:
         raise ScenarioError(f"{scenario.name}: device.valve: the firmware sets no pressure; give a valve that it opens")
     if "sent_command" in run.program.ports_with_laws:

@@ -157,7 +157,8 @@ def firmware(scenario: Scenario) -> dict[str, bytes]:
 
 def parameters_header(fixed: FixedPointController) -> str:
     """Return ``parameters.h``: the numbers of a law with unit, meaning, origin and range check."""
-    scenario, law = fixed.scenario, fixed.law
+    scenario = fixed.scenario
+    law = fixed.law
     control = scenario.controller
     declared = {quantity.name: quantity for quantity in CONTROLLERS[control.kind].quantities}
     source = scenario.origin.file or "a scenario without a file"

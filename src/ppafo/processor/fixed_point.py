@@ -128,7 +128,8 @@ def converter_of(
 
     A reference of 0 N m is in mid-range, and one count of the reference is the torque of one count of pressure.
     """
-    top, middle = float(2 ** int(bits) - 1), float(2 ** (int(bits) - 1))
+    top = float(2 ** int(bits) - 1)
+    middle = float(2 ** (int(bits) - 1))
     step = pressure_range / top
     return CountResolution(pressure_step=step, torque_step=torque_constant * step), (top, middle)
 

@@ -58,7 +58,8 @@ def try_firmware(scenario: Scenario, samples: int, seed: int = 1) -> FirmwareTri
     drawn = list(drawn_readings(fixed.numbers.limits.top, samples, seed))
     printed = _printed_by_mspdebug(firmware(scenario), drawn)
     found, cycles = _decisions(printed)
-    processor, expected = PythonProcessor(fixed), []
+    processor = PythonProcessor(fixed)
+    expected = []
     for number, readings in enumerate(drawn):
         if number % EPISODE == 0:
             processor.begin()
@@ -142,7 +143,9 @@ def build_firmware(folder: Path, goal: str = "all") -> None:
 
 def _decisions(printed: str) -> tuple[list[tuple[int, int]], list[int]]:
     """Return command [steps] and validity flag of each sample in mspdebug's output, and the clock cycles it took."""
-    found, cycles, before = [], [], 0
+    found = []
+    cycles = []
+    before = 0
     for number, (total, outputs) in enumerate(_ANSWER.findall(printed)):
         # Each episode begins with the wait for its first sample.
         if number % (EPISODE + 1):

@@ -62,7 +62,8 @@ class Column:
     @property
     def texts(self) -> list[str]:
         """Cells as text: numbers in display units, counts with thousands separators, a dash for a missing value."""
-        kind, texts = self.kind, []
+        kind = self.kind
+        texts = []
         for value in self.values:
             if isinstance(value, str):
                 text = value

@@ -244,7 +244,8 @@ def metric_text(value: float, si_unit: str) -> str:
 def metrics_lines(metrics: Mapping[str, Metric]) -> list[str]:
     """Return a line of text for each metric: name, value, display unit and meaning."""
     levels = [metric_level(metric.value, metric.unit) for metric in metrics.values()]
-    values, units = [without_exponent(value, _METRIC) for value, _ in levels], [unit for _, unit in levels]
+    values = [without_exponent(value, _METRIC) for value, _ in levels]
+    units = [unit for _, unit in levels]
     name_width, value_width, unit_width = (max(map(len, texts), default=0) for texts in (metrics, values, units))
     return [
         f"{name:<{name_width}}  {value:>{value_width}} {unit:<{unit_width}}  {metric.summary}"

@@ -321,7 +321,8 @@ def _draw(axes: "Axes", panel: Panel, size: tuple[float, float], title_size: flo
         style = {"linestyle": DASHES.get(mark.colour, "-"), **mark.style} if is_dashed else mark.style
         artist = SHAPES[mark.shape](axes, replace(mark, style=style), panel.x.values(mark.x), panel.y.values(mark.y))
         mapped = artist if mark.shape in ("map", "points") else mapped
-    title, pad = _title(panel), _ABOVE
+    title = _title(panel)
+    pad = _ABOVE
     axes.set_xlabel(_wrapped(panel.x.axis, size[0]))
     axes.set_ylabel(_wrapped(panel.y.axis, size[1] * panel.tall) if panel.title or not panel.shares_x else "")
     # A text carries its words itself.
@@ -396,7 +397,8 @@ def _share_scales(figure: "Figure", drawn: "Sequence[tuple[Axes, Panel, Any]]", 
         # A panel of nothing but failed runs has no limits.
         limits = limits[np.isfinite(limits).all(axis=1)]
         if limits.size:
-            lowest, highest = float(limits[:, 0].min()), float(limits[:, 1].max())
+            lowest = float(limits[:, 0].min())
+            highest = float(limits[:, 1].max())
             for drawing in coloured:
                 drawing.set_clim(lowest, highest)
         bar = figure.colorbar(coloured[0], ax=axes, pad=0.02)

@@ -155,7 +155,8 @@ def _panel(recording: Recording, quantity: _Quantity, valve: str, joint: JointNa
     always_shown = (gauge_zero(),) if kind.quantity == "pressure" else quantity.always_shown
     smallest_span = kind.shown_change(quantity.smallest_span)
     if kind is _COMMAND and float(np.abs(recording["command"]).max()) < _SMALL_COMMAND:
-        always_shown, smallest_span = (0.0,), _SMALL_COMMAND
+        always_shown = (0.0,)
+        smallest_span = _SMALL_COMMAND
     then = partial(_set_limits, ends, smallest_span, tuple(kind.values(always_shown)))
     vents = kind is _COMMAND and float(recording["command"].max()) > 1.0
     shown_kind = _COMMAND_THAT_VENTS if vents else kind
@@ -212,7 +213,8 @@ def draw_stored_result(stored: StoredResult, width: float | str | None = None) -
 
     Raises DataError that names the invalid key of ``run.json``.
     """
-    file, document = stored.folder / RUN_FILE, stored.document
+    file = stored.folder / RUN_FILE
+    document = stored.document
     title = table_at(file, document, "scenario").get("name", "")
     if not isinstance(title, str):
         raise _other_form(file, "scenario.name", title, "a text")

@@ -63,7 +63,8 @@ def sentence(text: str, title: str = "") -> str:
     stripped = text.strip()
     if not stripped:
         return ""
-    first, named = stripped.partition(" ")[0], title.split()
+    first = stripped.partition(" ")[0]
+    named = title.split()
     word = first.rstrip(".:,")
     is_symbol = any(mark in "._" or mark.isdecimal() for mark in word)
     is_name = word in (named if first.endswith(":") else named[:1])
@@ -97,7 +98,8 @@ def align_columns(rows: Sequence[Sequence[str]], left: int = 1, width: int = 0) 
     for place, texts in enumerate(zip(*rows, strict=True)):
         widest = max(map(len, texts))
         columns.append([f"{cell:<{widest}}" if place < left else f"{cell:>{widest}}" for cell in texts])
-    names, blocks = columns[:left], [columns[:left]]
+    names = columns[:left]
+    blocks = [columns[:left]]
     for column in columns[left:]:
         if width and len(blocks[-1]) > left and sum(len(each[0]) + 2 for each in (*blocks[-1], column)) - 2 > width:
             blocks.append([*names])

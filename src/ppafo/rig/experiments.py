@@ -127,7 +127,8 @@ def on_scale(before: float, actuator: float, limit: float) -> float:
 
 def _open_valve(device: Device, preset: Preset, _seed: int) -> dict[str, Floats]:
     """Mass flow [kg/s] of the fully open valve at several upstream and downstream pressures."""
-    ambient, pairs = device.supply.atmospheric_pressure, []
+    ambient = device.supply.atmospheric_pressure
+    pairs = []
     for level in (ambient + gauge for gauge in _UPSTREAM_GAUGE):
         pairs += [(level, ambient)]
         pairs += [(level, level * ratio) for ratio in _PRESSURE_RATIOS if level * ratio > ambient]
@@ -142,7 +143,8 @@ def _open_valve(device: Device, preset: Preset, _seed: int) -> dict[str, Floats]
 
 def _valve_map(device: Device, preset: Preset, _seed: int) -> dict[str, Floats]:
     """Mass flow [kg/s] of the valve over command, outlet to atmosphere; positive into chamber 1."""
-    supply, ambient = device.supply, device.supply.atmospheric_pressure
+    supply = device.supply
+    ambient = device.supply.atmospheric_pressure
     # The openings once nothing moves any more: of the valve with every time and frequency taken out.
     kind = VALVES[device.valve.kind]
     still = valve_settings(device.valve)._replace(**{item.name: 0.0 for item in kind.quantities if item.unit})
@@ -156,7 +158,8 @@ def _valve_map(device: Device, preset: Preset, _seed: int) -> dict[str, Floats]:
     rising = np.linspace(-1.0, 1.0, 101)
     commands = np.concatenate([rising, rising[-2::-1]])
     # The sweep begins at the lowest command, where the play lies behind the spool.
-    spool, flows = -1.0, []
+    spool = -1.0
+    flows = []
     for command in commands.tolist():
         spool = spool_position(spool, command, preset.values["bench.hysteresis"])
         openings = model.instant(parameters, model.settle(parameters, model.state(), spool, 0.0), spool)
@@ -172,7 +175,8 @@ def _valve_map(device: Device, preset: Preset, _seed: int) -> dict[str, Floats]:
 
 def _steady_leak(device: Device, _preset: Preset, _seed: int) -> dict[str, Floats]:
     """Mass flow [kg/s] that maintains the pressure in chamber 1, with chamber 2 at the atmosphere."""
-    ambient, plant = device.supply.atmospheric_pressure, plant_parameters(device)
+    ambient = device.supply.atmospheric_pressure
+    plant = plant_parameters(device)
     levels = ambient + np.tile(np.arange(5.0, 85.0, 5.0) * PASCALS_PER_PSI, 2)
     laminar = device.effects.get("laminar_leak", {}).get("coefficient", 0.0)
     flows = [orifice_flow(level, ambient, plant.leak_conductance, 1.0, plant.leak_curve) for level in levels.tolist()]
@@ -253,9 +257,11 @@ def record(
     true.check_pressurised("the simulated test bench", "; use the recording of a simulated run")
     at_rest = EXPERIMENTS[experiment].at_rest
     if at_rest is None:
-        values, interval = _run(experiment, scenario), scenario.run.output_interval
+        values = _run(experiment, scenario)
+        interval = scenario.run.output_interval
     else:
-        values, interval = at_rest(true, bench, seed), _READING_INTERVAL
+        values = at_rest(true, bench, seed)
+        interval = _READING_INTERVAL
     recording, errors = _read(experiment, values, interval, bench, true, seed)
     moved = vane_motion(scenario)
     kind = "leg" if moved.leg else getattr(moved, "kind", "free")
@@ -325,7 +331,8 @@ def _run(experiment: str, scenario: Scenario) -> dict[str, Floats]:
     result = simulate(replace(scenario, device=device))
     if not result.status.is_completed:
         raise SimulationError(f"the simulated test bench: {result.status}")
-    found, supply = result.recording, device.supply
+    found = result.recording
+    supply = device.supply
     values = {name: found[name] for name in found.names}
     for name, line, level in (
         ("supply_pressure", "line_pressure_1", supply.pressure),
@@ -340,7 +347,8 @@ def _read(
     experiment: str, true: Mapping[str, Floats], interval: float, bench: Preset, device: Device, seed: int
 ) -> tuple[Recording, dict[str, dict[str, float]]]:
     """Return the recording of the sensors, and offset [SI] and gain error [-] of each; other channels are exact."""
-    ambient, is_run = device.supply.atmospheric_pressure, EXPERIMENTS[experiment].at_rest is None
+    ambient = device.supply.atmospheric_pressure
+    is_run = EXPERIMENTS[experiment].at_rest is None
     channels = {}
     errors = {}
     for name, values in true.items():
@@ -358,7 +366,8 @@ def _read(
         shown = np.array(values)
         # Readings of steady states no lag changes.
         for sample in range(1, shown.size if lag > 0.0 and is_run else 0):
-            before, now = float(values[sample - 1]), float(values[sample])
+            before = float(values[sample - 1])
+            now = float(values[sample])
             shown[sample] = follow(1.0 / lag, interval, float(shown[sample - 1]), before, now)
         # A gauge sensor shows the atmosphere as 0, whatever its gain.
         turn = ambient if CHANNELS[name].unit == "Pa" and name != "pressure_difference" else 0.0
@@ -400,7 +409,8 @@ def check_rig_folder(folder: Path, experiment: str) -> dict[str, Any]:
     file of another origin.
     """
     # A file that a killed writer left behind is the writer's own.
-    entries, name = entries_of(folder) if folder.is_dir() else [], f"{experiment}.csv"
+    entries = entries_of(folder) if folder.is_dir() else []
+    name = f"{experiment}.csv"
     present = {entry.name for entry in entries if LEFT_ASIDE not in entry.name}
     recordings: Any = {}
     if RIG_FILE in present:

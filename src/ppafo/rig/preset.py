@@ -108,7 +108,8 @@ def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Pres
     ``overrides`` are texts such as ``rig.pressure_sensor.noise=0 Pa_d``. Raises ParameterError for an invalid preset or
     override.
     """
-    file, content = label(str(name_or_path)), _FILE.read(name_or_path)
+    file = label(str(name_or_path))
+    content = _FILE.read(name_or_path)
     document = _FILE.parse(content, file)
     check_keys(document, declared(document), file, ParameterError, content)
     values = {

@@ -87,7 +87,8 @@ def plateaus(values: Floats) -> tuple[_Plateau, _Plateau]:
     found = []
     for value, word in ((values.max(), "largest"), (values.min(), "smallest")):
         edges = np.flatnonzero(np.diff(np.concatenate(([0], (values == value).astype(np.int8), [0]))))
-        starts, ends = edges[::2], edges[1::2]
+        starts = edges[::2]
+        ends = edges[1::2]
         longest = int(np.argmax(ends - starts))
         found.append(_Plateau(int(starts[longest]), int(ends[longest] - 1), float(value), word))
     return found[0], found[1]
@@ -201,7 +202,8 @@ def lasting_noise_of(values: Floats, most: float = math.inf) -> float:
     smooth or at rest. Of noise the spread lasts as a window is halved, of a smooth signal hardly any is left; the
     longest windows in which it lasts show noise that neighbouring samples share; more than ``most`` is the signal's.
     """
-    white, length = noise_of(values), values.size // _LONGEST_WINDOW
+    white = noise_of(values)
+    length = values.size // _LONGEST_WINDOW
     while length >= 2 * _SHORTEST_WINDOW:
         spread, half, quarter = (_spread_about_cubics(values, length // part) for part in (1, 2, 4))
         if half > _LASTING * spread and spread < most:

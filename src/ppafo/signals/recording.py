@@ -379,7 +379,8 @@ def between_samples(recording: Recording, name: str, times: Floats, start: float
 
     Before the first and after the last sample the value is constant.
     """
-    values, own_times = recording[name], recording.time - start
+    values = recording[name]
+    own_times = recording.time - start
     if recording.is_held(name):
         # The last sample at or before each time: a command holds from the instant at which it was given.
         return values[np.maximum(np.searchsorted(own_times, times, side="right") - 1, 0)]

@@ -79,7 +79,8 @@ class RecordedResult:
         from ppafo.report.kind import metric_text, metric_words
         from ppafo.report.style import png_of
 
-        head, rows = html.escape(str(self).partition("\n")[0]), []
+        head = html.escape(str(self).partition("\n")[0])
+        rows = []
         for name, metric in self.metrics.items():
             cells = (metric_words(name), metric_text(metric.value, metric.unit), metric.summary)
             rows.append("".join(f'<td style="text-align: left">{html.escape(cell)}</td>' for cell in cells))

@@ -91,7 +91,9 @@ def read_hardware(reading: DocumentReader) -> tuple[Origin, Graph]:
 
     Values of the file that replace those of another set or valve are logged. Raises ParameterError for unusable values.
     """
-    section, in_file, overrides = reading.document["device"], reading.content.get("device", {}), reading.device
+    section = reading.document["device"]
+    in_file = reading.content.get("device", {})
+    overrides = reading.device
     valve = section.get("valve")
     with refused_as(ParameterError, f"{reading.file}: [device]", ParameterError):
         of_file = read_overrides(section.get("overrides", ()))
@@ -101,12 +103,14 @@ def read_hardware(reading: DocumentReader) -> tuple[Origin, Graph]:
         place = str(reading.folder / set_name) if is_path and set_name not in list_sets() else set_name
         plain_set = reading.parameter_set or load_parameter_set(place)
         valve_name = chosen_valve(plain_set, valve)
-        owner, replacing = "", tuple[Override, ...]()
+        owner = ""
+        replacing = tuple[Override, ...]()
         if set_name != in_file.get("set"):
             # Another set than the file's own may have one chamber only.
             missing = OF_SECOND_CHAMBER if plain_set.has_one_chamber else ()
             of_file = tuple(item for item in of_file if item.typed not in missing)
-            owner, replacing = set_name, of_file
+            owner = set_name
+            replacing = of_file
         elif valve != in_file.get("valve"):
             owner = f"valve '{valve_name}'"
             replacing = tuple(item for item in of_file if item.typed.startswith(CHOSEN_VALVE))
@@ -119,7 +123,8 @@ def read_hardware(reading: DocumentReader) -> tuple[Origin, Graph]:
             _warn_once(f"ppafo: {reading.file}: {replaced}")
     before = atmospheric_pressure(set_of_file) if overrides else None
     changed = with_overrides(set_of_file, overrides, valve)
-    kept, texts = "; ".join(filter(None, (replaced, reading.kept))), tuple(item.words for item in reading.overrides)
+    kept = "; ".join(filter(None, (replaced, reading.kept)))
+    texts = tuple(item.words for item in reading.overrides)
     origin = Origin(reading.path, set_name, valve_name, texts, reading.content, kept, changed)
     return origin, links_of_set(changed, valve_name, overridden, before)
 
@@ -149,7 +154,8 @@ def build_scenario(reading: DocumentReader) -> Scenario:
 
     Raises ScenarioError or ParameterError for the first value that cannot be used.
     """
-    document, kind = reading.document, kind_at(reading.document, "controller")
+    document = reading.document
+    kind = kind_at(reading.document, "controller")
     law, (origin, links) = CONTROLLERS[kind], read_hardware(reading)
     device = read_device(reading, origin, links)
     # Refusals are in the units of the set.
@@ -333,14 +339,14 @@ def read_assumptions(reading: DocumentReader, origin: Origin) -> tuple[Assumptio
 
     Raises ScenarioError for a path without a value.
     """
-    replaced, as_written = (
-        {override.typed for override in reading.overrides},
-        replace(reading, document=reading.content),
-    )
+    replaced = {override.typed for override in reading.overrides}
+    as_written = replace(reading, document=reading.content)
     notes: Mapping[str, str] = reading.document.get(_ASSUMED, {})
-    assumptions, unknown = [], []
+    assumptions = []
+    unknown = []
     for path, note in notes.items():
-        value, value_in_file = _value_text(reading, origin, path), _value_text(as_written, origin, path)
+        value = _value_text(reading, origin, path)
+        value_in_file = _value_text(as_written, origin, path)
         if value is None and value_in_file is None:
             unknown.append(path)
         if value is None:
@@ -353,7 +359,8 @@ def read_assumptions(reading: DocumentReader, origin: Origin) -> tuple[Assumptio
     if unknown:
         known = [*OF_A_VANE.paths(reading.document), *device_paths()]
         hints = "".join(nearest_name(path, known) for path in unknown)
-        names, has = ", ".join(f"'{one_line(path)}'" for path in unknown), "has" if len(unknown) == 1 else "have"
+        names = ", ".join(f"'{one_line(path)}'" for path in unknown)
+        has = "has" if len(unknown) == 1 else "have"
         raise ScenarioError(f"{reading.file}: [{_ASSUMED}] names {names}, which {has} no value in this scenario{hints}")
     return tuple(assumptions)
 

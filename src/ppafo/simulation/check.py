@@ -244,7 +244,8 @@ def _compared(
         if not channels:
             continue
         extent = _signal_range(result, unit)
-        allowed, promised = ALLOWED_PARTING * extent, promised_error * extent / MARGIN
+        allowed = ALLOWED_PARTING * extent
+        promised = promised_error * extent / MARGIN
         differences = [(kind, _largest_differences(repeat.recording, recording, channels)) for kind, repeat in repeats]
         changes = _largest_changes((kind, float(np.max(each))) for kind, each in differences)
         courses.append(NumberCheck(name, unit, extent, allowed, changes, promised))
@@ -298,11 +299,13 @@ def with_tolerance(scenario: Scenario, error: ErrorEstimate, rerun: Rerun) -> Er
     """Complete the estimate by a smaller tolerance whose trial run has the promised accuracy, if one is found."""
     from ppafo.simulation.plan import plan_run
 
-    tolerance, over_promise = scenario.run.tolerance, error.over_promise
+    tolerance = scenario.run.tolerance
+    over_promise = error.over_promise
     smallest = max(SMALLEST_TRIED * tolerance, SMALLEST_TOLERANCE)
     while over_promise > 1.0:
         # The error is proportional to the tolerance: half of the tolerance that just meets the promise is tried.
-        last, tolerance = tolerance, float(f"{max(0.5 * tolerance / over_promise, smallest):.1g}")
+        last = tolerance
+        tolerance = float(f"{max(0.5 * tolerance / over_promise, smallest):.1g}")
         if tolerance >= last:
             return error
         run = plan_run(replace(scenario, run=replace(scenario.run, tolerance=tolerance)))
@@ -330,7 +333,8 @@ def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
 
     Raises SimulationError for a Python controller that gives a different run each time, which makes a check impossible.
     """
-    scenario, recording = result.scenario, result.recording
+    scenario = result.scenario
+    recording = result.recording
     controller = scenario.controller.custom
     if controller is not None:
         same = rerun([run])[0].recording
@@ -342,7 +346,9 @@ def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
     starts = [start_moved(run, move, opposite) for opposite in (1.0, -1.0) for move in (MOVE, -MOVE)]
     runs = [(FINER, finer(run)), *((MOVED_START, moved) for moved in starts)]
     if not run.program.ideal_sensors:
-        sensors, angles, pressures = run.sensors, _signal_range(result, "rad"), _signal_range(result, "Pa")
+        sensors = run.sensors
+        angles = _signal_range(result, "rad")
+        pressures = _signal_range(result, "Pa")
         # One draw alone seldom crosses a step of a coarse sensor without noise.
         draws = 1 if sensors.angle_noise or sensors.pressure_noise else DRAWS
         for draw, move in product(range(draws), (MOVE, -MOVE)):
@@ -368,7 +374,8 @@ def start_moved(run: Run, move: float, opposite: float) -> Run:
     With ``opposite`` -1 chamber 2 starts with slightly less gas instead, so that a torque that equals the reference
     exactly no longer does.
     """
-    plant, start = run.plant, run.initial
+    plant = run.plant
+    start = run.initial
     angle = start.angle
     if run.program.angle is None:
         shifted = angle + move * (plant.angle_max - plant.angle_min)
@@ -405,8 +412,10 @@ def _largest_changes(changes: Iterable[tuple[str, float]]) -> dict[str, float]:
 
 def _metric_range(result: RecordedResult, name: str, unit: str) -> float:
     """Range of the quantity of a metric; 1 for a count of events, 0 for a unit without a range."""
-    scenario, recording = result.scenario, result.recording
-    angles, pressures = _signal_range(result, "rad"), _signal_range(result, "Pa")
+    scenario = result.scenario
+    recording = result.recording
+    angles = _signal_range(result, "rad")
+    pressures = _signal_range(result, "Pa")
     torques = abs(scenario.device.actuator.torque_constant) * pressures
     # Largest mass in both chambers; a walk does not record it, and takes more than that.
     masses = [recording[name] for name in ("mass_1", "mass_2") if name in recording]

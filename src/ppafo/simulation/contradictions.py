@@ -59,7 +59,8 @@ def check_contradictions(scenario: Scenario, reading: DocumentReader) -> None:
     for path, is_bad, reason in contradictions_in(scenario):
         if not np.any(is_bad):
             continue
-        quantity, given = declared.get(path), value_at(reading.document, path) if path else None
+        quantity = declared.get(path)
+        given = value_at(reading.document, path) if path else None
         units = dict(scenario.device.shown)
         # Limits in the unit of the value that is refused.
         if quantity is not None and isinstance(given, str):

@@ -109,7 +109,8 @@ def declared(document: Mapping[str, Any], motion: MotionSection | None = None) -
     ``motion`` is the section of a motion that the document does not name. Raises KindError for a component that cannot
     be loaded, and for a walk.
     """
-    controlled, profile = controlled_in(document), kind_at(document, "reference")
+    controlled = controlled_in(document)
+    profile = kind_at(document, "reference")
     motion = motion or section_of(document)
     law = named(CONTROLLERS, document, "controller")
     named(PROFILES, document, "reference")
@@ -183,7 +184,8 @@ def reference_settings(kind: str, controlled: str) -> tuple[Quantity, ...]:
     settings = profile_settings(kind, followed.level)
     if controlled == TORQUE or kind not in PROFILES:
         return settings
-    profile, span = PROFILES[kind], followed.level.maximum - followed.level.minimum
+    profile = PROFILES[kind]
+    span = followed.level.maximum - followed.level.minimum
     levels = {quantity.name for quantity in profile.quantities if not quantity.unit}
 
     def of_reference(quantity: Quantity) -> Quantity:
@@ -200,7 +202,8 @@ def profile_settings(kind: str, prescribed: Quantity) -> tuple[Quantity, ...]:
     """Return the settings of a profile; levels, which have no unit of their own, get the prescribed quantity's unit."""
     settings = []
     for quantity in PROFILES[kind].quantities if kind in PROFILES else ():
-        lowest, highest = max(quantity.minimum, prescribed.minimum), min(quantity.maximum, prescribed.maximum)
+        lowest = max(quantity.minimum, prescribed.minimum)
+        highest = min(quantity.maximum, prescribed.maximum)
         # A level is a torque in a reference and an angle in a motion, so that it has no unit of its own.
         is_level = not quantity.unit
         settings.append(

@@ -120,7 +120,8 @@ def is_gain(setting: Quantity) -> bool:
 
 def gain_link(parts: LoopParts, law: ControllerKind, rule: PlainFunction) -> Link | None:
     """Return the link of a default gain by its rule, whose arguments are groups; None where one of them is unknown."""
-    names, direct = list(inspect.signature(rule).parameters), tuple[str, ...]()
+    names = list(inspect.signature(rule).parameters)
+    direct = tuple[str, ...]()
     # The reach in an angle is not known: the dead zone of a law of the angle is to be given.
     if ("joint" in names and parts.controls_torque) or ("reach" in names and parts.controlled == ANGLE):
         return None
@@ -131,7 +132,8 @@ def gain_link(parts: LoopParts, law: ControllerKind, rule: PlainFunction) -> Lin
     elif rule is torque_loop.dead_zone_opening:
         direct = ("controller.dead_zone",)
         if any(quantity.name == "dead_band" for quantity in VALVES[parts.device.valve.kind].quantities):
-            rule, direct = opening_beyond_band, (*direct, "valve.dead_band")
+            rule = opening_beyond_band
+            direct = (*direct, "valve.dead_band")
     return LoopLink(direct, rule, groups=tuple(name for name in names if name in GROUPS), parts=parts)
 
 

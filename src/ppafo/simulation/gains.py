@@ -83,7 +83,8 @@ def gains_of(scenario: Scenario) -> Gains | None:
     ]
     if not items:
         return None
-    parts, asked = loop_parts(scenario, law), Asked(partial(number_at, scenario))
+    parts = loop_parts(scenario, law)
+    asked = Asked(partial(number_at, scenario))
     loop: TorqueLoop = parts.group("loop", asked, {})
     light = 0.0 if parts.controls_torque else lightness(loop, parts.group("joint", asked, {}))
     gains = tuple(

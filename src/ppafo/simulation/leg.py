@@ -64,9 +64,11 @@ def plan_leg(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     leg = _leg_of(scenario)
     # Curves were made when the file was read; these two of their numbers may have been changed since, or vary.
     if leg.curves is None:
-        kind, shank = PROFILES[leg.shank.kind], profile_parameters(leg.shank)
+        kind = PROFILES[leg.shank.kind]
+        shank = profile_parameters(leg.shank)
     else:
-        kind, shank = GAIT_SHANK, leg.curves._replace(start=leg.shank.start, toe_lever=leg.toe_lever)
+        kind = GAIT_SHANK
+        shank = leg.curves._replace(start=leg.shank.start, toe_lever=leg.toe_lever)
 
     def put_on(plant: PlantParameters) -> tuple[PlantParameters, LedLeg]:
         foot = leg.foot_mass, leg.foot_mass_centre, leg.foot_inertia
@@ -81,7 +83,9 @@ def measured_leg(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str,
 
     If the shank follows a gait, the recording also has the measured foot angle of that gait.
     """
-    kind, leg, angle = run.program.shank, run.leg, rows["state.angle"]
+    kind = run.program.shank
+    leg = run.leg
+    angle = rows["state.angle"]
     channels: dict[str, tuple[Floats, str]] = {}
     # A shank at rest has one angle, which the scenario says.
     if kind is not None and leg is not None and kind is not CONSTANT:
@@ -97,7 +101,8 @@ def measured_leg(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str,
 
     def external_torque(torque: Floats) -> Floats:
         # T_ex by the second row of equation (11): what the foot needs beside T_2. A blow at a stop is not in it.
-        carried, plant = _leg_of(scenario), run.plant
+        carried = _leg_of(scenario)
+        plant = run.plant
         assert leg is not None, "a run on a leg has a leg"
         assert kind is not None, "a run on a leg has a shank motion"
         # The foot alone: inertia and weight of vane and foot plate are on the other side of T_ex.

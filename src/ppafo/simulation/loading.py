@@ -67,8 +67,10 @@ def request_of_file(
     file: TomlKind = FILE,
 ) -> DocumentReader:
     """Return the request for the scenario of a file."""
-    name, content = label(str(name_or_path)), file.read(name_or_path)
-    document, text = FILE.parse(content, name), decoded(content)
+    name = label(str(name_or_path))
+    content = file.read(name_or_path)
+    document = FILE.parse(content, name)
+    text = decoded(content)
     return DocumentReader(
         name,
         document,
@@ -116,7 +118,8 @@ def request_of_dict(content: Mapping[str, Any], overrides: Iterable[str]) -> Doc
 
 def request_again(origin: Origin) -> DocumentReader:
     """Return the request from which a scenario was built."""
-    file, content = origin.file, origin.content
+    file = origin.file
+    content = origin.content
     name, folder = (_name_in_messages(content), Path()) if file is None else (label(file), Path(file).parent)
     overrides = read_overrides(origin.overrides, ScenarioError)
     return DocumentReader(name, content, path=file, folder=folder, overrides=overrides)
@@ -130,7 +133,9 @@ def _name_in_messages(content: Mapping[str, Any]) -> str:
 
 def scenario_of(request: DocumentReader, layout: Layout) -> Scenario:
     """Check the keys of the file itself, apply the overrides, then check that all required keys are given."""
-    file, given, content = request.file, request.document, layout.content
+    file = request.file
+    given = request.document
+    content = layout.content
     # A set in the place of a scenario would else be refused key by key.
     if "default_valve" in given and not {"run", "controller"} & given.keys():
         of_set = (f"device.set={file}", f"device.valve={one_line(given['default_valve'])}")
@@ -164,7 +169,8 @@ def _check_layout(
 
     Beside these, numbers that cannot be read are named. With ``of_kinds_alone`` only an unknown ``kind`` is an error.
     """
-    file, document = reading.file, reading.document
+    file = reading.file
+    document = reading.document
 
     def place(path: str) -> str:
         is_of_file = value_at(document, path) == value_at(reading.content or document, path)

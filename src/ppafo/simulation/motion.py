@@ -76,8 +76,11 @@ def contradictions(scenario: Scenario) -> Iterator[Contradiction]:
     # The bounds of a curve need its knots in order.
     if any(np.any(is_bad) for is_bad, _ in disordered):
         return
-    delay, step, device = scenario.sensors.delay, scenario.run.step, scenario.device
-    motion, followed = vane_motion(scenario), CONTROLLED[scenario.controlled]
+    delay = scenario.sensors.delay
+    step = scenario.run.step
+    device = scenario.device
+    motion = vane_motion(scenario)
+    followed = CONTROLLED[scenario.controlled]
     stops = limits_of(device, CONTROLLED[ANGLE_CONTROLLED])
     profile = ProfileChoice("constant", {"level": motion.angle}) if motion.profile is None else motion.profile
 
@@ -115,11 +118,13 @@ def _beyond(scenario: Scenario, limits: Limits, profile: ProfileChoice, section:
     problems: dict[int, str] = {}
     for run in np.flatnonzero(outside).tolist():
         settings = {name: at(value, run) for name, value in profile.settings.items()}
-        duration, step = at(scenario.run.duration, run), at(scenario.run.step, run)
+        duration = at(scenario.run.duration, run)
+        step = at(scenario.run.step, run)
         profile_of_run = ProfileChoice(profile.kind, settings)
         lowest, highest, room = (at(number, run) for number in (limits.lowest, limits.highest, limits.room))
         limits_of_run = limits._replace(lowest=lowest, highest=highest, room=room)
-        course, numbers = ProfileCourse(PROFILES[profile.kind].value), profile_parameters(profile_of_run)
+        course = ProfileCourse(PROFILES[profile.kind].value)
+        numbers = profile_parameters(profile_of_run)
         moment, reached = excursion(numbers, *limits_of_run.allowed, duration, step, parts=course)
         outside[run] = moment >= 0.0
         ends = f"{limits_of_run.text(lowest)} to {limits_of_run.text(highest)}"
@@ -133,10 +138,12 @@ def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[dict[str, Any], tup
 
     Times are read as overrides of a file, once for each combination, of which an ensemble has few.
     """
-    texts, changed = time_texts(base), [path.split(".") for path in times]
+    texts = time_texts(base)
+    changed = [path.split(".") for path in times]
     combinations, index_of_run = np.unique(np.stack(list(times.values()), axis=1), axis=0, return_inverse=True)
     index_of_run = index_of_run.reshape(-1)
-    reasons, table = [""] * len(combinations), np.full((len(combinations), 4), np.nan)
+    reasons = [""] * len(combinations)
+    table = np.full((len(combinations), 4), np.nan)
     # A rate takes the place of a period that the file has, and the reverse.
     texts |= {section: {} for section, _ in changed if section == "controller"}
     for index, combination in enumerate(combinations.tolist()):
@@ -171,7 +178,8 @@ def lacks(scenario: Scenario, kind: MetricKind) -> str:
 
 def numbers_of_vane(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declarations of all numbers of a scenario except those of its device, keyed by path."""
-    kind, motion = scenario.motion.motion_kind, scenario.motion
+    kind = scenario.motion.motion_kind
+    motion = scenario.motion
     profile = None if kind.section is None else kind.section.profile
     moved = {} if profile is None else {profile.name: {"kind": getattr(motion, profile.name).kind}}
     document: dict[str, Any] = {"motion": moved, "controller": {"kind": scenario.controller.kind}}

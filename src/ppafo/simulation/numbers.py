@@ -62,7 +62,8 @@ def check_parts(scenario: Scenario) -> None:
 
     # The class of each attribute is that of its annotation, which of some has parts or None beside it.
     for name, hint in get_type_hints(Scenario).items():
-        part, kind = getattr(scenario, name), hint if isinstance(hint, UnionType) else get_origin(hint) or hint
+        part = getattr(scenario, name)
+        kind = hint if isinstance(hint, UnionType) else get_origin(hint) or hint
         if kind is not Motion and not isinstance(part, kind):
             of_class = f"an object of class {(*get_args(kind), kind)[0].__name__}"
             raise refusal(name, part, f"must be {'a text' if kind is str else of_class}")
@@ -71,7 +72,8 @@ def check_parts(scenario: Scenario) -> None:
     if scenario.controlled not in CONTROLLED:
         raise refusal("controlled", scenario.controlled, f"must be one of {', '.join(CONTROLLED)}")
     absent = _numbers_of_other_form(scenario.device) | {RATE_PATH}
-    to_float, named_effects = taken_number(), scenario.device.effects
+    to_float = taken_number()
+    named_effects = scenario.device.effects
     for path, quantity in declared_numbers(scenario).items():
         section, _, name = path.partition(".")
         # An effect that the device does not name has its defaults.
@@ -94,7 +96,8 @@ def check_parts(scenario: Scenario) -> None:
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declarations of all numbers of a scenario and its device, by path; both forms of each orifice."""
-    device, kind = scenario.device, scenario.device.actuator.kind
+    device = scenario.device
+    kind = scenario.device.actuator.kind
     declared = [(section, quantity) for section in FLAT_SECTIONS for quantity in members(section, kind)]
     declared += [("actuator.leak", quantity) for quantity in ORIFICE]
     declared += [(effect.section, quantity) for effect in device_effects() for quantity in effect.quantities]
@@ -186,7 +189,8 @@ def _present(scenario: Scenario) -> Asked:
 
 def present_numbers(scenario: Scenario) -> dict[str, float]:
     """Return the numbers of a single run [SI] by path, without those of an orifice's other form or an absent effect."""
-    named, absent = scenario.device.effects, _numbers_of_other_form(scenario.device)
+    named = scenario.device.effects
+    absent = _numbers_of_other_form(scenario.device)
     numbers = {}
     for path in declared_numbers(scenario):
         section, _, name = path.partition(".")
@@ -233,7 +237,8 @@ def _attributes(path: str, scenario: Scenario) -> tuple[str, ...]:
 
 
 def _replace_number(node: Any, attributes: tuple[str, ...], number: Any) -> Any:
-    name, inside = attributes[0], attributes[1:]
+    name = attributes[0]
+    inside = attributes[1:]
     inner = _replace_number(part_of(node, name), inside, number) if inside else number
     if isinstance(node, Mapping):
         return {**node, name: inner}

@@ -38,7 +38,8 @@ def override_document(request: DocumentReader, content: Content = OF_A_VANE) -> 
     A path that is neither declared nor of the device is among what is ``wrong``. Raises ScenarioError for an override
     that another one makes useless.
     """
-    document, file = request.document, request.file
+    document = request.document
+    file = request.file
     override_at = override_set(request.overrides, ScenarioError, content.same)
     if _VALVE in override_at:
         valve = override_at[_VALVE]
@@ -70,10 +71,12 @@ def override_document(request: DocumentReader, content: Content = OF_A_VANE) -> 
     of_old, of_new = (quantities_in(content.declare(each)) if old_kinds else {} for each in (document, changed))
     kept: dict[str, list[str]] = {}
     for path, quantity in of_new.items():
-        deciding, value = deciding_kinds(path, old_kinds)[-1:], value_at(changed, path)
+        deciding = deciding_kinds(path, old_kinds)[-1:]
+        value = value_at(changed, path)
         if not deciding or value is None or path in own or path.rpartition(".")[2] in _SAMPLING:
             continue
-        old, new = old_kinds[deciding[0]], own[deciding[0]].text
+        old = old_kinds[deciding[0]]
+        new = own[deciding[0]].text
         if old not in (None, new):
             # The meaning is news where both kinds do not have the same one.
             meaning = "" if path in of_old and of_old[path].summary == quantity.summary else f" ({quantity.summary})"

@@ -88,7 +88,9 @@ def compose_run(
     ``initial_state_of`` the initial state, both of the plant with lines and leg; ``plant`` is the plant without them.
     ``walk`` is a walking leg, ``leg`` one without ground contact.
     """
-    device, control, supply_lines = scenario.device, scenario.controller, scenario.supply_lines
+    device = scenario.device
+    control = scenario.controller
+    supply_lines = scenario.supply_lines
     # Where no torque is requested, an object in charge is asked between the steps of a program without a law.
     law = None if control.is_outside and not control.settings else scenario.motion.motion_kind.law(scenario)
     numbers: Mapping[str, Any] = control.settings
@@ -109,9 +111,11 @@ def compose_run(
     plant = plant if supply_lines is None else plant._replace(relieving=1.0)
     plant, led = (plant, None) if leg is None else leg.put_on(plant)
     counts, needs_parts, tolerance = time_grid_of(plant)
-    settings, model = valve_settings(device.valve), VALVES[device.valve.kind].choose(first_settings(device.valve))
+    settings = valve_settings(device.valve)
+    model = VALVES[device.valve.kind].choose(first_settings(device.valve))
     valve = model if walk is None else venting_valve(device.valve)
-    delay, signal_delay = valve.command_delay(settings), scenario.sensors.delay
+    delay = valve.command_delay(settings)
+    signal_delay = scenario.sensors.delay
     path = None if walk is not None else vane_motion(scenario).profile
     sections = {} if walk is not None else {"sensors": scenario.sensors}
     feed: ModuleType | None = None
@@ -233,7 +237,8 @@ def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
     """Initial angle, angular velocity and gas."""
     motion = vane_motion(scenario)
     if motion.profile is None:
-        angle, rate = motion.angle, motion.angular_velocity
+        angle = motion.angle
+        rate = motion.angular_velocity
     else:
         value = PROFILES[motion.profile.kind].value
         angle, rate, _ = of_profile(lambda numbers: value(numbers, 0.0), motion.profile)

@@ -79,7 +79,8 @@ def disordered_knots(choice: ProfileChoice, section: str) -> Problem:
 def profiles_of(scenario: Scenario) -> dict[str, ProfileChoice]:
     """Return the profiles of a scenario by section."""
     motion = scenario.motion
-    leg, path = getattr(motion, "leg", None), getattr(motion, "profile", None)
+    leg = getattr(motion, "leg", None)
+    path = getattr(motion, "profile", None)
     shank = None if leg is None else leg.shank
     found = {"reference": scenario.reference, "motion.profile": path, "motion.shank": shank}
     return {section: choice for section, choice in found.items() if isinstance(choice, ProfileChoice)}
@@ -116,7 +117,8 @@ def widened(lowest: Any, highest: Any) -> tuple[Any, Any]:
 
 def limits_of(device: Device, followed: ControlledQuantity) -> Limits:
     """Reach of a device in the controlled quantity of a reference; infinite for a torque."""
-    actuator, room = device.actuator, device.supply.atmospheric_pressure
+    actuator = device.actuator
+    room = device.supply.atmospheric_pressure
     ends = Ends(actuator.angle_min, actuator.angle_max, *device.highest_pressures, room)
     lowest, highest = (-np.inf, np.inf) if followed.reach is None else followed.reach(ends)
     words = f"{followed.limits} of {device.name}"
@@ -137,7 +139,9 @@ def excursion(
     The times are those of the engine as far as they can be gone through one by one, and crests between two of them.
     """
     count = max(1.0, min(MAXIMUM_CHECKED_TIMES, float(int(duration / step + 0.5))))
-    number, moment, found = 0.0, -1.0, 0.0
+    number = 0.0
+    moment = -1.0
+    found = 0.0
     while number <= count and moment < 0.0:
         time = duration * number / count
         value, rate, acceleration = parts.value(profile, time)

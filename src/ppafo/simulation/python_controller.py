@@ -30,14 +30,16 @@ class SampledRun:
     """
 
     def __init__(self, batch: Batch) -> None:
-        program, clock = batch.program, batch.clock
+        program = batch.program
+        clock = batch.clock
         self.samples = math.ceil(clock.step_count / clock.steps_per_sample)
         self.sample = 0
         self._batch = batch
         self._block = LaneBlock(
             load_program(program, effort_for(batch)), program, clock, batch.parameters, batch.states
         )
-        self._reference, self._step = _parameter_group(batch, "reference"), _parameter_group(batch, "timing").step
+        self._reference = _parameter_group(batch, "reference")
+        self._step = _parameter_group(batch, "timing").step
         self._rows = row_numbers(program.state_rows())
         self._plant, self._sensors = (_parameter_group(batch, name) for name in ("plant", "sensors"))
         self.requests_torque = program.controller is OUTSIDE
@@ -84,11 +86,13 @@ class SampledRun:
 
         Walking sensors have memory: their measurement is taken once a sample.
         """
-        program, clock = self._batch.program, self._batch.clock
+        program = self._batch.program
+        clock = self._batch.clock
         if program.walks:
             seen = self._walk_measurement()
             if self.requests_torque:
-                self._before, period = self._requested, clock.steps_per_sample * self._step
+                self._before = self._requested
+                period = clock.steps_per_sample * self._step
                 self._requested = OUTSIDE.update(self._law, self._before, 0.0, seen, period)[1]
             return seen
         # Delayed sensors show an earlier state.
@@ -96,7 +100,8 @@ class SampledRun:
             signals = self._block.late_signals(self.sample * clock.steps_per_sample)
             angle, pressure_1, pressure_2 = signals[:, 0]
         else:
-            groups, state = program.state_rows(), self._block.states[:, 0].tolist()
+            groups = program.state_rows()
+            state = self._block.states[:, 0].tolist()
             effect_states = {name: group_of(name, groups, state) for name in program.effect_states}
             angle, *masses = (state[self._rows[f"state.{name}"]] for name in ("angle", "mass_1", "mass_2"))
             pressures = program.actuator.pressures(self._plant, angle, *masses)
@@ -126,7 +131,8 @@ class SampledRun:
 
     def result(self) -> BatchResult:
         """States and record so far, including the sample reached by the last command."""
-        clock, result = self._batch.clock, self._block.result()
+        clock = self._batch.clock
+        result = self._block.result()
         if not clock.record_every:
             return result
         steps = min(self.sample * clock.steps_per_sample, clock.step_count)
@@ -139,13 +145,16 @@ class SampledRun:
 
     def _walk_measurement(self) -> GaitMeasurement:
         """Measurement of a walking controller, of the present state."""
-        program, plant, state = self._batch.program, self._plant, self._block.states[:, 0].tolist()
+        program = self._batch.program
+        plant = self._plant
+        state = self._block.states[:, 0].tolist()
         paths = "state.angle", "state.mass_1", "state.mass_2", "walk.heel_force", "walk.toe_force"
         angle, mass_1, mass_2, heel, toe = (state[self._rows[path]] for path in paths)
         pressures = program.actuator.pressures(plant, angle, mass_1, mass_2)
         if program.ideal_sensors:
             return GaitMeasurement(angle, *pressures, program.actuator.torque(plant, angle, *pressures), heel, toe)
-        sensors, sample = (self._sensors, self._gait_sensors, self._last_measurement), self.sample
+        sensors = (self._sensors, self._gait_sensors, self._last_measurement)
+        sample = self.sample
         found, self._last_measurement = measure_gait(
             *sensors, angle, *pressures, heel, toe, plant, sample, parts=program.functions
         )
@@ -171,7 +180,8 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
     SimulationError for a command that is no finite number, and for a programming error in the controller.
     """
     run = SampledRun(batch)
-    name, walks = type(controller).__name__, batch.program.walks
+    name = type(controller).__name__
+    walks = batch.program.walks
     is_framed = run.requests_torque and not reads_gait(controller.update)
     # The object's memory of an earlier run must not steer this one.
     try:
@@ -212,7 +222,8 @@ def _programming_error(controller: PythonController, error: NameError | Attribut
         # The method's own body has not begun: its arguments do not fit.
         signatures = "reset(self) and update(self, time, reference, measurement)"
         return SimulationError(f"{type(controller).__name__}: {error}; define {signatures}")
-    name, hint = getattr(error, "name", None), ""
+    name = getattr(error, "name", None)
+    hint = ""
     if name is not None and isinstance(error, AttributeError):
         hint = nearest_name(name, [known for known in dir(error.obj) if not known.startswith("_")])
     elif name is not None:

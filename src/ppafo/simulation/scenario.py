@@ -291,7 +291,8 @@ class Sensors:
     @property
     def flaws(self) -> tuple[float, ...]:
         """Imperfections of the sensors [s, rad, Pa, rad, Pa, Hz, Hz]; all 0 for ideal sensors."""
-        noise, steps = (self.angle_noise, self.pressure_noise), (self.angle_resolution, self.pressure_resolution)
+        noise = (self.angle_noise, self.pressure_noise)
+        steps = (self.angle_resolution, self.pressure_resolution)
         return self.delay, *noise, *steps, self.angle_bandwidth, self.pressure_bandwidth
 
 
@@ -433,7 +434,8 @@ class Scenario:
                 needs = "it needs 'reset()' and 'update(time, reference, measurement)'"
                 raise ScenarioError(f"{self.name}: a controller of type {kind} has no method '{method}'; {needs}")
         # A law that requests a torque in a walk leaves its request to the object.
-        names, settings = [quantity.name for quantity in ASSISTING_QUANTITIES], self.controller.settings
+        names = [quantity.name for quantity in ASSISTING_QUANTITIES]
+        settings = self.controller.settings
         requests = self.motion.motion_kind.layout == WALK and settings.keys() >= set(names)
         settings = {name: settings[name] for name in names} if requests else {}
         changed = with_control(self, Control(PYTHON_CONTROLLER, settings, self.controller.period, controller))

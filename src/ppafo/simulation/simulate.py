@@ -132,7 +132,8 @@ class Result(RecordedResult):
         """Return name, status, duration and one line per metric, in display units."""
         from ppafo.report.kind import name_lines
 
-        scenario, status = self.scenario, self.status
+        scenario = self.scenario
+        status = self.status
         head = f"Result of '{scenario.name}', {scenario.run.duration:g} s: {status.message or status.kind}"
         return "\n".join([head, *name_lines(self.metrics)])
 
@@ -148,7 +149,8 @@ class Result(RecordedResult):
         from ppafo.report.recording_figure import recording_figure
 
         remark = "" if self.status.is_completed else self.status.message
-        valve, joint = self.scenario.device.valve.kind, self.scenario.device.joint
+        valve = self.scenario.device.valve.kind
+        joint = self.scenario.device.joint
         return recording_figure(self.recording, self.scenario.name, remark, valve, joint)
 
     @in_own_units
@@ -255,7 +257,8 @@ def rows_by_path(run: Run, record: Floats) -> dict[str, Floats]:
 
 def end_of(run: Run, outcome: BatchResult) -> tuple[Status, Floats]:
     """Status of a run, with time, last good state and remedy if it diverged; and the times [s] of its samples."""
-    rows, record = state_row_numbers(run), outcome.record[:, :, 0]
+    rows = state_row_numbers(run)
+    record = outcome.record[:, :, 0]
     times: Floats = np.arange(len(record), dtype=np.float64) * (run.step * run.record_every)
     failed = float(outcome.states[rows["result.failure_time"], 0])
     if failed >= NEVER_FAILED and bool(np.isfinite(outcome.states).all()):

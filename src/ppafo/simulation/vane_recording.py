@@ -26,7 +26,8 @@ from ppafo.simulation.scenario import Scenario, vane_motion
 
 def measured_vane(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Measured:
     """Return recording and metrics of a vane; T_ex of equation (1) is constant, or moves the vane along its profile."""
-    path, plant = vane_motion(scenario).profile, run.plant
+    path = vane_motion(scenario).profile
+    plant = run.plant
 
     def external_torque(torque: Floats) -> Floats:
         if path is None:
@@ -81,7 +82,8 @@ def device_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str,
     With supply lines: line pressures and the gas through the bottle's regulator. With an energy balance: true masses,
     temperatures and energies.
     """
-    angle, actuator = rows["state.angle"], run.program.actuator
+    angle = rows["state.angle"]
+    actuator = run.program.actuator
     masses = rows["state.mass_1"], rows["state.mass_2"]
     pressure_1, pressure_2 = over_samples(actuator.pressures, run.plant, angle, *masses)
     channels: dict[str, tuple[Floats, str]] = {
@@ -120,7 +122,9 @@ def device_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str,
 
 def net_torques(run: Run, rows: Mapping[str, Floats], torque: Floats) -> Floats:
     """Net torque [N m] on a vane at each sample; ``torque`` [N m] is the actuator's. Equation (1)."""
-    angle, rate, plant = rows["state.angle"], rows["state.angular_velocity"], run.plant
+    angle = rows["state.angle"]
+    rate = rows["state.angular_velocity"]
+    plant = run.plant
     masses = rows["state.mass_1"], rows["state.mass_2"]
     pressures = over_samples(run.program.actuator.pressures, plant, angle, *masses)
     sliding = _with_effects(run, rows, friction_in_motion, plant.dynamic_torque, rate, *pressures)

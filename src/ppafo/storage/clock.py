@@ -88,14 +88,22 @@ def _stamp(cell: str, form: ClockForm | None, row: str) -> tuple[float, str, str
     match = _TIME.search(text)
     if match is None:
         raise DataError(f"{row}: {shown} is not a time of day such as '08:00:10,5'")
-    first, second, third = int(match["first"]), int(match["second"]), match["third"]
+    first = int(match["first"])
+    second = int(match["second"])
+    third = match["third"]
     if third is not None:
-        hour, minute, whole_seconds = first, second, int(third)
+        hour = first
+        minute = second
+        whole_seconds = int(third)
     # 00:10.5 has a fraction, which minutes have not.
     elif form == "min:s" or (form is None and match["fraction"] is not None):
-        hour, minute, whole_seconds = 0, first, second
+        hour = 0
+        minute = first
+        whole_seconds = second
     elif form == "h:min":
-        hour, minute, whole_seconds = first, second, 0
+        hour = first
+        minute = second
+        whole_seconds = 0
     else:
         raise DataError(
             f'{row}: {shown} may be hours and minutes or minutes and seconds; give clock = "h:min" or clock = "min:s" '
@@ -109,7 +117,8 @@ def _stamp(cell: str, form: ClockForm | None, row: str) -> tuple[float, str, str
         hour = hour % 12 + (12 if half_of_day == "p" else 0)
     fraction = float(f"0.{match['fraction']}") if match["fraction"] else 0.0
     beside = f"{text[: match.start()]} {text[match.end() :]}".strip(" T,;")
-    seconds, zone = 3600.0 * hour + 60.0 * minute + whole_seconds + fraction, match["zone"] or ""
+    seconds = 3600.0 * hour + 60.0 * minute + whole_seconds + fraction
+    zone = match["zone"] or ""
     offset = _OFFSET.search(zone)
     if offset is not None:
         seconds -= (-1.0 if offset[1] == "-" else 1.0) * (3600.0 * int(offset[2]) + 60.0 * int(offset[3] or 0))

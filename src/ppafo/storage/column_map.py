@@ -111,7 +111,8 @@ def load_column_map(path: str | Path, name: str | None = None) -> ColumnMap:
 
     Raises DataError if there is no such map, or if there are several and no name is given.
     """
-    file, content = label(str(path)), _FILE.read(path)
+    file = label(str(path))
+    content = _FILE.read(path)
     document = {key: table for key, table in _FILE.parse(content, file).items() if key == "columns"}
     maps = checked_record(_ColumnMaps, document, file, DataError, content).columns
     if name is None and len(maps) > 1:

@@ -84,7 +84,9 @@ def parse_header(cells: list[str]) -> list[HeaderColumn]:
                 f"the header must name columns as 'name [unit]', separated by commas, not as '{shown}'"
                 f"{_MAPPED}, for another delimiter or a decimal comma too"
             )
-        name, unit, word = match[1], "Pa" if match[2] == LEVEL else match[2], match[3]
+        name = match[1]
+        unit = "Pa" if match[2] == LEVEL else match[2]
+        word = match[3]
         # Time itself does nothing between its samples.
         between = next((known for known in BETWEEN if word == known and name != TIME), None)
         if word and between is None:
@@ -274,7 +276,8 @@ def kind_of_comments(comments: Iterable[str]) -> RecordingKind:
 def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats:
     """Parse the numbers below the header row by row, which needs far less memory than all cells as text."""
     # Blank lines may only follow the last row: one between rows is a sample that was lost.
-    numbers, blank = array("d"), None
+    numbers = array("d")
+    blank = None
     for line, row in enumerate(rows, start=skipped + 2):
         if not row:
             blank = blank or line
@@ -292,7 +295,8 @@ def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats
         whole = "".join(row)
         if not whole.isascii() or "_" in whole or not all(map(math.isfinite, values)):
             is_number = [cell.isascii() and finite_number(cell.strip()) is not None for cell in row]
-            name, cell = header[is_number.index(False)].strip(), one_line(row[is_number.index(False)])[:LONGEST_SHOWN]
+            name = header[is_number.index(False)].strip()
+            cell = one_line(row[is_number.index(False)])[:LONGEST_SHOWN]
             raise DataError(f"line {line}, column '{name}': {cell!r} is not a finite number, such as 1.5")
         numbers.extend(values)
     return np.array(numbers).reshape(-1, len(header))

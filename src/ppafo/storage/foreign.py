@@ -200,16 +200,21 @@ class _NumberColumn:
 
     def __init__(self, channel: str, title: str, columns: ColumnMap) -> None:
         mapped = columns.channels[channel]
-        self.channel, self.title, self.decimal, self.thousands = channel, title, columns.decimal, mapped.thousands
+        self.channel = channel
+        self.title = title
+        self.decimal = columns.decimal
+        self.thousands = mapped.thousands
         words = (_WORDS_OF_DIRECTION if channel == _DIRECTION else {}) if mapped.words is None else mapped.words
-        self.words, self.values = list(words), {word.lower(): words[word] for word in reversed(words)}
+        self.words = list(words)
+        self.values = {word.lower(): words[word] for word in reversed(words)}
 
     def number_in(self, cell: str, line: int) -> float:
         """Parse the number, or a known word, in a cell. Raises DataError for any other text."""
         text = cell.strip()
         if text.lower() in self.values:
             return self.values[text.lower()]
-        at, key = f"line {line}, column {self.title!r}", f"(channels.{self.channel}.column)"
+        at = f"line {line}, column {self.title!r}"
+        key = f"(channels.{self.channel}.column)"
         mark = _MARKS[self.thousands] if self.thousands else ""
         # Marks between groups of digits have to be where they belong: without its mark 1.5 would be 15.
         if self.thousands and mark in text:
@@ -332,12 +337,14 @@ def _channel(name: str, mapped: MappedChannel, table: MappedTable, atmosphere: f
             column = HeaderColumn(name, _flow_unit(name, unit, mapped, gas) or PLAIN_NUMBER, mapped.between)
             return column.channel(np.full(table.size, value), atmosphere)
     numbers = table.numbers.get(name, np.empty(0))
-    values, unit = mapped.sign * (mapped.factor * numbers + mapped.offset), mapped.unit
+    values = mapped.sign * (mapped.factor * numbers + mapped.offset)
+    unit = mapped.unit
     key = f"unit = {mapped.unit!r}"
     if mapped.times is not None:
         with refused_as(DataError, f"channels.{name}.times = {mapped.times!r}", UnitError):
             multiple, unit_of_multiple = split_number(mapped.times)
-        values, unit = values * multiple, f"{unit} {unit_of_multiple}".removeprefix(f"{PLAIN_NUMBER} ").strip()
+        values = values * multiple
+        unit = f"{unit} {unit_of_multiple}".removeprefix(f"{PLAIN_NUMBER} ").strip()
         key += f" with times = {mapped.times!r}"
     with refused_as(DataError, f"channels.{name}.{key}", UnitError):
         return HeaderColumn(name, _flow_unit(name, unit, mapped, gas), mapped.between).channel(values, atmosphere)

@@ -236,7 +236,8 @@ def read_mapped_matlab(file: _MatlabFile, columns: ColumnMap, map_name: str) -> 
                 if mapped.column is not None:
                     named[name] = _variable(f"channels.{name}.column", mapped.column, file, is_text=name == TIME)
         raise_noted(faults)
-        date, clock = columns.channels[TIME].date, file.texts.get(named.get(TIME, ""))
+        date = columns.channels[TIME].date
+        clock = file.texts.get(named.get(TIME, ""))
         dates = (
             file.texts.get(_variable(f"channels.{TIME}.date", date, file, is_text=True)) if date is not None else None
         )

@@ -118,7 +118,8 @@ def own_items(group: Any) -> Iterator[tuple[str, Any]]:
 
 def _check_is_whole(name: str, variable: Any) -> None:
     """Raise DataError for values never written, and for chunks that decompress to more than stated."""
-    size, chunks = variable.size, variable.chunks
+    size = variable.size
+    chunks = variable.chunks
     if chunks is None:
         if variable.id.get_storage_size() < size * variable.dtype.itemsize:
             raise DataError(f"'{name}' should have {size} values, but the file contains none of them")

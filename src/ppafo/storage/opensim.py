@@ -47,7 +47,9 @@ def opensim_recording(
 
     Moment and force per mass are multiplied by ``body_mass`` [kg]; without a body mass they are omitted and named.
     """
-    foot, coordinate, mass = side[0], f"ankle_angle_{side[0]}", body_mass or 0.0
+    foot = side[0]
+    coordinate = f"ankle_angle_{side[0]}"
+    mass = body_mass or 0.0
     units = {name: recording.unit(name) for name in recording.names}
     per_mass = [name for name in _PER_MASS if units.get(name) in ("N m/kg", "-", "N/kg")]
     missing = tuple(per_mass) if body_mass is None else ()

@@ -44,7 +44,8 @@ def parquet_bytes(columns: Mapping[str, Column], described: Mapping[str, str]) -
         pa.field(name, array.type, metadata={"unit": unit, "summary": summary})
         for (name, (_, unit, summary)), array in zip(columns.items(), arrays, strict=True)
     ]
-    table, buffer = pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=dict(described))), io.BytesIO()
+    table = pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=dict(described)))
+    buffer = io.BytesIO()
     # Bytes of one significance are alike from row to row, and texts are few that repeat.
     pq.write_table(
         table,
@@ -112,7 +113,8 @@ def _expanded_bytes(metadata: "pq.FileMetaData") -> int:
     for number in range(metadata.num_row_groups):
         group = metadata.row_group(number)
         for index in range(group.num_columns):
-            column, width = group.column(index), metadata.schema.column(index).length or 0
+            column = group.column(index)
+            width = metadata.schema.column(index).length or 0
             count = max(column.num_values, group.num_rows)
             required += max(count * max(width, _BYTES_OF_A_VALUE), column.total_uncompressed_size)
     return required

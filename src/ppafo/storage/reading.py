@@ -39,7 +39,8 @@ def recording_of_frame(frame: Any, atmosphere: float = STANDARD_ATMOSPHERE) -> R
     absolute]. Raises DataError for a table without time, a column without unit and a cell that is no finite number.
     """
     attributes, (header, named) = dict(frame.attrs), _named_columns(frame)
-    title, kind = str(attributes.get("title", "")) or "table", str(attributes.get("kind", "measured"))
+    title = str(attributes.get("title", "")) or "table"
+    kind = str(attributes.get("kind", "measured"))
     values = [_numbers(name, np.asarray(column)) for name, column in named]
     return recording_of_columns(header, values, range(len(values[0])), title, recording_kind(kind), atmosphere, "row")
 
@@ -101,7 +102,8 @@ def _named_columns(frame: Any) -> tuple[list[HeaderColumn], list[tuple[str, Any]
     )
     heads = []
     for name, _ in columns:
-        unit, head = units.get(name, ""), name
+        unit = units.get(name, "")
+        head = name
         # Of a table without units all names are bare, its time too.
         if "[" not in name and (unit or (name == TIME and any(units.values()))):
             head = f"{name} [{PLAIN_NUMBER if unit == '1' else unit or TIME_UNIT}]"

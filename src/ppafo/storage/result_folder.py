@@ -151,7 +151,8 @@ def add_to_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
     for name in (MARK, RUN_FILE):
         document = read_json(folder / name) if (folder / name).is_file() else None
         if isinstance(document, dict) and document.get("format") in (MARK_FORMAT, FORMAT) and HASHES in document:
-            hashes, stated = document[HASHES], document.get("files")
+            hashes = document[HASHES]
+            stated = document.get("files")
             if (
                 not isinstance(hashes, dict)
                 or not isinstance(stated, list)

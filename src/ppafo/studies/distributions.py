@@ -51,7 +51,8 @@ def _truncated_normal(uniform: Floats, mean: float, deviation: float, minimum: f
     from scipy.special import ndtr, ndtri
 
     # Above the mean, 1 - ndtr would cancel: the upper tail is the lower tail of the mirrored distribution.
-    low, high = (minimum - mean) / deviation, (maximum - mean) / deviation
+    low = (minimum - mean) / deviation
+    high = (maximum - mean) / deviation
     side = -1.0 if low > 0.0 else 1.0
     score = side * ndtri(ndtr(side * low) + (ndtr(side * high) - ndtr(side * low)) * uniform)
     return np.clip(mean + deviation * score, minimum, maximum)

@@ -89,7 +89,8 @@ class Uncertainty:
         if self.scores is not None:
             from scipy.special import ndtr, ndtri
 
-            scores, columns = ndtri(uniform), []
+            scores = ndtri(uniform)
+            columns = []
             for row in self.scores:
                 # Term by term: the rounding of a matrix product may depend on the number of draws.
                 total = row[0] * scores[:, 0]
@@ -138,7 +139,8 @@ class Uncertainty:
         if NOISE_SEED in varied or not (is_noisy or (closed and varied & _NOISE_LEVELS)):
             return self
         noise = RandomValue(NOISE_SEED, Distribution("whole_numbers", (0.0, float(LARGEST_SEED))))
-        alone, scores = (*(0.0,) * len(self.drawn), 1.0), self.scores
+        alone = (*(0.0,) * len(self.drawn), 1.0)
+        scores = self.scores
         factor = None if scores is None else (*((*row, 0.0) for row in scores), alone)
         return replace(self, drawn=(*self.drawn, noise), scores=factor)
 
@@ -209,10 +211,12 @@ def permute(numbers: Words, size: int, seed: int, stream: int) -> Words:
     half = np.uint64(max(1, -(-(size - 1).bit_length() // 2)))
     keys = _mix(np.arange(1, _ROUNDS + 1, dtype=np.uint64) + np.uint64((seed << 24) + (stream << 8)))
     mask = (np.uint64(1) << half) - np.uint64(1)
-    result, outside = numbers.copy(), np.arange(numbers.size)
+    result = numbers.copy()
+    outside = np.arange(numbers.size)
     # The network permutes a power of four of numbers, so those that end above the size go through it again.
     while outside.size:
-        left, right = result[outside] >> half, result[outside] & mask
+        left = result[outside] >> half
+        right = result[outside] & mask
         for key in keys:
             left, right = right, left ^ (_mix(right ^ key) & mask)
         result[outside] = (left << half) | right

@@ -64,7 +64,8 @@ def noise_interval(values: Floats, others: Floats, confidence: float) -> Confide
 
     values = values[: others.size]
     both = np.isfinite(values) & np.isfinite(others)
-    first, second = values[both], others[both]
+    first = values[both]
+    second = others[both]
     if first.size < 2:
         return None
     mean = 0.5 * float(np.mean(first + second))

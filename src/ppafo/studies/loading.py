@@ -215,7 +215,8 @@ def _build(parsed: StudyFile, document: dict[str, Any], source: _StudySource, ch
     wrong = list[PpafoError]()
     configurations = []
     vary = parsed.vary
-    sections, paths = parsed.configurations, [entry["path"] for entry in parsed.vary]
+    sections = parsed.configurations
+    paths = [entry["path"] for entry in parsed.vary]
     for section in sections:
         with noted_in(wrong):
             configurations.append(_configuration(section, source.folder))
@@ -246,7 +247,8 @@ def _build(parsed: StudyFile, document: dict[str, Any], source: _StudySource, ch
             with noted_in(wrong):
                 _check_not_set(entry, section, configuration)
     for path, other in followed.items():
-        said, leading = f"vary '{path}': same_as = '{other}'", [each for each in paths if each not in followed]
+        said = f"vary '{path}': same_as = '{other}'"
+        leading = [each for each in paths if each not in followed]
         # A path that is refused itself has no unit.
         units = [varied[each].quantity.unit or "-" for each in (path, other) if each in varied]
         if other not in leading:
@@ -259,7 +261,8 @@ def _build(parsed: StudyFile, document: dict[str, Any], source: _StudySource, ch
     random = [entry["path"] for entry in vary if entry["kind"] not in NOT_RANDOM]
     with noted_in(wrong):
         uncertainty = replace(uncertainty, scores=_scores(parsed.correlations, random))
-    outputs, sample = parsed.outputs, parsed.sample
+    outputs = parsed.outputs
+    sample = parsed.sample
     with noted_in(wrong):
         outputs = valid_outputs(outputs, scenarios)
     # A grid alone is run once, with the noise that its scenarios write.
@@ -311,7 +314,9 @@ def _varied(
     entry: Mapping[str, Any], configurations: Sequence[Configuration], atmosphere_varies: bool
 ) -> tuple[VariedPath, Axis | RandomValue | None]:
     """Return a varied path, and its values or distribution in SI; None for one that takes those of another path."""
-    names, path, only = [each.name for each in configurations], entry["path"], entry.get("only")
+    names = [each.name for each in configurations]
+    path = entry["path"]
+    only = entry.get("only")
     with refused_as(StudyError, f"vary '{path}'", ScenarioError, UnitError):
         for name in only or ():
             if name not in names:
@@ -337,7 +342,8 @@ def _varied(
 def _check_not_set(entry: Mapping[str, Any], section: ConfigurationSection, configuration: Configuration) -> None:
     """Raise StudyError for a path that is both set and varied in a configuration, in any form (area, conductance)."""
     overrides = read_overrides(section.overrides, StudyError)
-    path, only = chosen_path(entry["path"], configuration.scenario), entry.get("only")
+    path = chosen_path(entry["path"], configuration.scenario)
+    only = entry.get("only")
     set_values = override_set(overrides, StudyError, valve=configuration.scenario.device.valve_name)
     # The varied column replaces the value in every run, whichever form of it is set.
     ignored = next((form for form in (path, *other_forms(path)) if form in set_values), None)
@@ -367,7 +373,8 @@ def _scores(correlations: Sequence[Correlation], paths: Sequence[str]) -> Factor
         coefficients[first, other] = min(max(pair.coefficient, -_CLOSEST), _CLOSEST)
     matrix = np.eye(len(paths))
     for (first, other), coefficient in coefficients.items():
-        row, column = paths.index(first), paths.index(other)
+        row = paths.index(first)
+        column = paths.index(other)
         matrix[row, column] = matrix[column, row] = coefficient
     factor = cholesky_factor(matrix)
     if factor is None:

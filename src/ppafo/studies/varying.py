@@ -96,7 +96,8 @@ def varied_path(
         near = [name for name in known if name.startswith(f"{section}.")]
         hint = nearest_name(path, known) or f"; for example {', '.join(near[:6] or list(known)[:6])}"
         raise ScenarioError(f"scenario '{scenario.name}' has no numeric value '{path}'{hint}")
-    quantity, texts = known[path], list(texts)
+    quantity = known[path]
+    texts = list(texts)
     number, given = next((split_quantity(str(text)) for text in texts if unit_in(text)), (0.0, ""))
     is_plain = number == 0.0 or _SMALLEST_SHOWN <= abs(number) < _LARGEST_SHOWN
     # A text that cannot be read is refused with its key, where it is converted.
@@ -112,7 +113,8 @@ def varied_path(
 
 def value_at(path: str, scenario: Scenario) -> float | None:
     """Return the value [SI] of a scenario at a path as in overrides; None if there is none."""
-    run, period = scenario.run, scenario.controller.period
+    run = scenario.run
+    period = scenario.controller.period
     of_clock = {
         "controller.period": period,
         "controller.rate": 1.0 / period,
@@ -134,7 +136,8 @@ def texts_of(entry: Mapping[str, Any]) -> list[object]:
 
 def axis_or_distribution(entry: Mapping[str, Any], varied: VariedPath) -> Axis | RandomValue:
     """Convert a ``[[vary]]`` table to an axis or distribution; UnitError with the key of an unusable value."""
-    path, kind = varied.path, entry["kind"]
+    path = varied.path
+    kind = entry["kind"]
     if kind == "whole_numbers" and not varied.quantity.whole:
         raise UnitError(f"kind = 'whole_numbers' is only for {NOISE_SEED}; use 'choice' or 'uniform'")
     if varied.quantity.whole and kind not in ("grid", "list", "choice", "whole_numbers"):
@@ -207,7 +210,8 @@ def _level(key: str, value: str | float, varied: VariedPath) -> float:
 
 def stated_normal(varied: VariedPath, scenario: Scenario) -> tuple[Distribution, str]:
     """Return the stated distribution of a path and its unit in the parameter set; UnitError without an uncertainty."""
-    origin, path = scenario.origin, varied.path
+    origin = scenario.origin
+    path = varied.path
     # With the overrides of the scenario: one that replaces a value takes its uncertainty away.
     parameters = origin.parameters
     assert parameters is not None, "read from a file"

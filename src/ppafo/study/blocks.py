@@ -51,10 +51,12 @@ def chunks_of(study: Study) -> list[Chunk]:
     chunks = list[Chunk]()
     total = study.runs_of_configuration
     for configuration in range(len(study.configurations)):
-        first, runs = 0, size if study.runs_of_chunk is not None else min(size, _FIRST_RUNS_OF_CHUNK)
+        first = 0
+        runs = size if study.runs_of_chunk is not None else min(size, _FIRST_RUNS_OF_CHUNK)
         while first < total:
             chunks.append(Chunk(len(chunks), configuration, first, min(runs, total - first)))
-            first, runs = first + runs, min(2 * runs, size)
+            first = first + runs
+            runs = min(2 * runs, size)
     return chunks
 
 

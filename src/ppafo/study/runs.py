@@ -53,9 +53,14 @@ class RunCounter:
     """Counter of runs for progress reports, starting from ``done``; the total ``runs`` doubles if exceeded."""
 
     def __init__(self, runs: int, progress: Report | None, done: int = 0, failed: int = 0) -> None:
-        self._total, self._report, self._started = max(1, runs), progress, 0.0
-        self.done, self.failed, self._earlier = done, failed, 0
-        self._ended, self._reported = 0, 0.0
+        self._total = max(1, runs)
+        self._report = progress
+        self._started = 0.0
+        self.done = done
+        self.failed = failed
+        self._earlier = 0
+        self._ended = 0
+        self._reported = 0.0
 
     def add(self, runs: int, failed: int) -> None:
         """Count finished runs; the reported rate excludes the first batch, whose time may include compilation."""
@@ -63,9 +68,11 @@ class RunCounter:
         self.failed += failed
         # Those that the next part has ended meanwhile stay counted.
         self._ended = max(0, self._ended - runs)
-        done, self._reported = self.done + self._ended, time.monotonic()
+        done = self.done + self._ended
+        self._reported = time.monotonic()
         if not self._earlier:
-            self._earlier, self._started = done, self._reported
+            self._earlier = done
+            self._started = self._reported
         # A search does not know how many runs it will take: a total that follows would always say 'nearly done'.
         while self._total < done:
             self._total *= 2
@@ -92,8 +99,13 @@ class Runs:
     def __init__(
         self, evaluate: Evaluation, counter: RunCounter, at_once: int, executor: Executor | None = None
     ) -> None:
-        self.count, self.failures, self.reason = 0, 0, ""
-        self._evaluate, self._counter, self._at_once, self._executor = evaluate, counter, at_once, executor
+        self.count = 0
+        self.failures = 0
+        self.reason = ""
+        self._evaluate = evaluate
+        self._counter = counter
+        self._at_once = at_once
+        self._executor = executor
 
     def run(self, columns: Mapping[str, Floats]) -> Rows:
         """Run the model with values [SI] by path, each column (runs,), and return its rows."""
@@ -103,7 +115,8 @@ class Runs:
         parts = {}
         for number, part in self._parts(columns, len(next(iter(columns.values())))):
             parts[number] = part
-            count, failures = part[FAILED].size, int(part[FAILED].sum())
+            count = part[FAILED].size
+            failures = int(part[FAILED].sum())
             self.count += count
             self.failures += failures
             self._counter.add(count, failures)
@@ -122,12 +135,14 @@ class Runs:
             blocks = [part(first, size) for first in range(0, runs, size)]
             yield from computed_by(self._executor, self._evaluate, blocks)
             return
-        first, size = 0, min(self._at_once, _FIRST_AT_ONCE)
+        first = 0
+        size = min(self._at_once, _FIRST_AT_ONCE)
         while first < runs:
             started = time.monotonic()
             yield first, self._evaluate(part(first, size))
             # Numbers that follow the varied ones may take longer than the runs, which no estimate knows.
-            first, rate = first + size, size / max(time.monotonic() - started, 1.0e-6)
+            first = first + size
+            rate = size / max(time.monotonic() - started, 1.0e-6)
             size = max(1, min(self._at_once, int(_BETWEEN_REPORTS * rate)))
 
     def check(self, rows: Rows, maximum_failed: float, subject: str, metrics: Sequence[str] = ()) -> None:
@@ -135,7 +150,8 @@ class Runs:
 
         Statistics of the remaining runs would be biased. ``subject`` names the rows in the message.
         """
-        failures, runs = int(rows[FAILED].sum()), rows[FAILED].size
+        failures = int(rows[FAILED].sum())
+        runs = rows[FAILED].size
         if failures > maximum_failed * runs:
             raise StudyError(
                 f"{subject}: {failures:,} of {runs:,} runs failed ({100.0 * failures / runs:.3g} %), more than the "
@@ -194,7 +210,8 @@ def run_judged(
         )
     except ScenarioError as error:  # its message names the scenario
         raise StudyError(str(error)) from error
-    failed, found = result.status != COMPLETED, result.metrics
+    failed = result.status != COMPLETED
+    found = result.metrics
     judged = verdicts(found, scenario, columns, gauge)
     return {
         **{name: found[name] for name in metrics},

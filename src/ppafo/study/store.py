@@ -243,7 +243,8 @@ def manifest(study: Study) -> dict[str, Any]:
     scenarios = {}
     programs = {}
     for name, scenario in ((each.name, each.scenario) for each in study.configurations):
-        document, custom = scenario_document(scenario), scenario.controller.custom
+        document = scenario_document(scenario)
+        custom = scenario.controller.custom
         # Without the file it came from, which may lie elsewhere the next time.
         del document["origin"]
         if custom is not None:
@@ -301,9 +302,12 @@ def claim(
     for name in ("finished", "runs"):
         if (folder.path / name).is_symlink():
             raise StudyError(f"{folder.path / name}: is a link, but results stay in one folder; choose another folder")
-    names, asked, chunks = folder.names(), manifest(study), chunks_of(study)
+    names = folder.names()
+    asked = manifest(study)
+    chunks = chunks_of(study)
     if MANIFEST in names:
-        before, now = _leaves("", read_manifest(folder)), _leaves("", asked)
+        before = _leaves("", read_manifest(folder))
+        now = _leaves("", asked)
         if changed := [name for name in {**now, **before} if before.get(name) != now.get(name)]:
             said = f"{changed[0]} was {quote(before.get(changed[0]))} and is now {quote(now.get(changed[0]))}"
             other = f"{folder.path}: contains the results of another study"
@@ -313,7 +317,8 @@ def claim(
             f"{folder.path}: is not empty and contains no study results (it has no {MANIFEST}); choose another folder"
         )
     else:
-        needed, free = estimate_bytes(study), free_bytes(folder.path)
+        needed = estimate_bytes(study)
+        free = free_bytes(folder.path)
         size = f"{folder.path}: {study.runs:,} runs of '{study.name}' need about {needed / 1e6:,.3g} MB"
         if needed > free:
             raise StudyError(f"{size}, but only {free / 1e6:,.3g} MB are free: use fewer runs, metrics or trajectories")
@@ -349,7 +354,8 @@ def _leaves(path: str, value: Any) -> dict[str, Any]:
 
 def estimate_bytes(study: Study) -> int:
     """Return an upper estimate of the disk space [bytes], without compression."""
-    outputs, samples = study.outputs, max(samples_of(study, configuration) for configuration in study.configurations)
+    outputs = study.outputs
+    samples = max(samples_of(study, configuration) for configuration in study.configurations)
     numbers = 2 + len(study.paths) + len(outputs.metrics) * (2 if outputs.errors else 1)
     traces = sum(_BYTES_OF_NUMBER if name in outputs.bands else _BYTES_OF_SAMPLE for name in outputs.traces)
     row = _FIXED_BYTES_OF_ROW + _BYTES_OF_NUMBER * numbers + samples * traces
@@ -365,11 +371,13 @@ def compute_chunk(
     study: Study, part: Chunk, threads: int | None = None, count: Count = report_nothing
 ) -> tuple[int, bytes]:
     """Compute a chunk; returns the number of its failed runs and its file: a row per run in SI, nan for missing."""
-    configuration, outputs = study.configurations[part.configuration], study.outputs
+    configuration = study.configurations[part.configuration]
+    outputs = study.outputs
     values = drawn_values(study, np.arange(part.first, part.first + part.runs))
     rows, varied = _rows(study, configuration, values, threads, count)
     first = part.configuration * study.runs_of_configuration + part.first
-    names, own = [each.name for each in study.configurations], np.full(part.runs, part.configuration)
+    names = [each.name for each in study.configurations]
+    own = np.full(part.runs, part.configuration)
     columns = {
         "run": (np.arange(first, first + part.runs, dtype=np.int64), _PLAIN, "number of the run in the study"),
         "configuration": (encode_texts(own, names), _PLAIN, "name of the base scenario"),
@@ -392,7 +400,8 @@ def compute_chunk(
         **{name: (encode_truths(rows[name]), _PLAIN, summary) for name, summary in truths.items()},
     }
     for name in outputs.metrics:
-        unit, error = METRICS[name].unit, f"{name}_error"
+        unit = METRICS[name].unit
+        error = f"{name}_error"
         columns[name] = (rows[name], stored_unit(unit), METRICS[name].summary)
         if outputs.errors:
             columns[error] = (rows[error], "Pa_d" if unit == "Pa" else unit, f"estimated error of {name}")
@@ -415,7 +424,8 @@ def _rows(
     count: Count = report_nothing,
 ) -> tuple[Rows, dict[str, Floats]]:
     """Return rows of a configuration with varied ``values`` [SI], and its columns; StudyError for a fixed path."""
-    outputs, columns = study.outputs, varied_columns(study, configuration, values)
+    outputs = study.outputs
+    columns = varied_columns(study, configuration, values)
     kept = {"bands": outputs.traces, "every": outputs.every * bool(outputs.traces), "errors": outputs.errors}
     with refused_as(StudyError, f"configuration '{configuration.name}'", StudyError):
         base = configuration.scenario

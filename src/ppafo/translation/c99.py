@@ -157,11 +157,14 @@ class _Writer:
 
     def written_struct(self, kind: Items | Row) -> list[str]:
         """Return the declaration of a struct, with its constructor function where one is called."""
-        name, is_array = self.struct_names[kind], isinstance(kind, Items) and kind.is_uniform
+        name = self.struct_names[kind]
+        is_array = isinstance(kind, Items) and kind.is_uniform
         if isinstance(kind, Items) and kind.is_uniform:
-            inner, count = self.type_name(kind.types[0]), len(kind.types)
+            inner = self.type_name(kind.types[0])
+            count = len(kind.types)
             members = [(inner, f"item[{count}]")]
-            taken, variable = {f"item_{index}": inner for index in range(count)}, "made"
+            taken = {f"item_{index}": inner for index in range(count)}
+            variable = "made"
         else:
             named = (
                 [(member_name(kind, own), inner) for own, inner in kind.fields]
@@ -309,7 +312,8 @@ class _Body:
         self.used.add(counter)
         sign, change = ("<", f"++{counter}") if loop.step == 1 else (">", f"{counter} += {loop.step}")
         sign = "<" if loop.step > 0 else ">"
-        start, stop = self.terms.term(loop.start), self.terms.term(loop.stop, 6)
+        start = self.terms.term(loop.start)
+        stop = self.terms.term(loop.stop, 6)
         if loop.name == LANE:
             # Without the pragma gcc fears that lanes overlap, and takes them one by one.
             yield from self.line("PPAFO_SIDE_BY_SIDE", level)

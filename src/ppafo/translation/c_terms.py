@@ -109,7 +109,8 @@ class CTerms:
         # An int of 32 bits would carry digits that the small processor does not have.
         if term.type == INT16 and term.kind in _ARITHMETIC:
             # Arithmetic on 16 bits gives an int in C, which has 16 or 32.
-            text, level = f"(int16_t)({text})", _SIGN
+            text = f"(int16_t)({text})"
+            level = _SIGN
         return f"({text})" if level < least else text
 
     def text_and_level(self, term: Term) -> tuple[str, int]:
@@ -134,9 +135,11 @@ class CTerms:
             case "name":
                 text = self.name(term.detail)
             case "field":
-                kind, sign = term.parts[0].type, "."
+                kind = term.parts[0].type
+                sign = "."
                 if isinstance(kind, RowReference):
-                    kind, sign = kind.row, "->"
+                    kind = kind.row
+                    sign = "->"
                 assert isinstance(kind, Row)
                 text = f"{self.term(term.parts[0], _ATOM)}{sign}{member_name(kind, term.detail)}"
             case "item":
@@ -205,7 +208,8 @@ class CTerms:
         if term.kind in _WORDS:
             left, right = (self.term(part, level if part.kind == term.kind else _LEVELS["<"]) for part in term.parts)
         else:
-            left, right = self.term(term.parts[0], inner), self.term(term.parts[1], inner + 1)
+            left = self.term(term.parts[0], inner)
+            right = self.term(term.parts[1], inner + 1)
         return f"{left} {_WORDS.get(term.kind, term.kind)} {right}", level or _CHOICE
 
     def number(self, term: Term) -> tuple[str, int]:

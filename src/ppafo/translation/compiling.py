@@ -101,7 +101,8 @@ def compile_library(source: str, library: Path, command: Sequence[str], flags: S
     written.write_text(source, encoding="utf-8")
     position = () if sys.platform == "win32" else ("-fPIC",)
     line = [*command, *flags, "-shared", *position, str(written), "-o", str(library), "-lm"]
-    done, name = asked(line, scratch=folder), Path(command[0]).name
+    done = asked(line, scratch=folder)
+    name = Path(command[0]).name
     if done.returncode in _INTERRUPTED:
         # By the same key as this process: the compiler works all the same.
         raise SimulationError(f"the compiler {name} was interrupted; try again")

@@ -143,7 +143,8 @@ class Expressions:
 
     def _of_subscript(self, node: ast.Subscript) -> Term:
         if isinstance(node.value, ast.Attribute) and node.value.attr == "shape":
-            array, dimension = self.term(node.value.value), self.literal(node.slice)
+            array = self.term(node.value.value)
+            dimension = self.literal(node.slice)
             kind = array.type
             if array.kind != "name" or not isinstance(kind, Array) or dimension not in range(kind.dimensions):
                 raise self.refused(node, f"'{ast.unparse(node)}' must be the size of an existing dimension of an array")
@@ -180,7 +181,8 @@ class Expressions:
         if owner.kind != "name":
             raise self.refused(node, f"'{ast.unparse(node)}' indexes an expression; assign the array to a name first")
         if isinstance(node.slice, ast.Slice):
-            begin, end = node.slice.lower, node.slice.upper
+            begin = node.slice.lower
+            end = node.slice.upper
             if begin is None or end is None or node.slice.step is not None or kind.shape:
                 problem = f"the slice '{ast.unparse(node.slice)}' must have a start, a stop and no step"
                 raise self.refused(node.slice, problem)
@@ -249,7 +251,8 @@ class Expressions:
             return Term("pow", FLOAT, parts)
         sign = SIGN_OF.get(type(node.op), "")
         self.check_sides(node, sign, self.term(node.left), self.term(node.right))
-        left, right = self.scalar(node.left, INT), self.scalar(node.right, INT)
+        left = self.scalar(node.left, INT)
+        right = self.scalar(node.right, INT)
         is_whole = left.type == right.type == INT
         if not sign or (not is_whole and sign in INTEGER_OPERATORS | {"//", "%"}):
             raise self.refused(node, f"the operator in '{ast.unparse(node)}' has no equivalent in C for these types")
@@ -302,7 +305,9 @@ class Expressions:
         )
 
     def _of_ifexp(self, node: ast.IfExp) -> Term:
-        test, yes, no = self.condition(node.test), self.term(node.body), self.term(node.orelse)
+        test = self.condition(node.test)
+        yes = self.term(node.body)
+        no = self.term(node.orelse)
         kind = joined(yes.type, no.type)
         if kind is None:
             raise self.refused(node, f"both branches of '{ast.unparse(node)}' must have the same type")
@@ -341,7 +346,8 @@ class Expressions:
     def called(self, name: str, node: ast.Call) -> tuple[Function, tuple[Term, ...]]:
         """Return the called function of the module, with its arguments."""
         definition = self.definitions[name]
-        names, values = [argument.arg for argument in definition.args.args], list(map(self.term, node.args))
+        names = [argument.arg for argument in definition.args.args]
+        values = list(map(self.term, node.args))
         # Calls between functions were checked when they were composed; this is a call of the engine's own.
         if len(values) != len(names) or node.keywords:
             missing = names[len(values) :]

@@ -83,7 +83,8 @@ class _ModuleWalk:
                 raise self.refused(definition, f"'{name}' calls itself")
             self.open.add(key)
             # Each choice of types is a function of its own, since C has no overloading.
-            number, unique_name = 1, name
+            number = 1
+            unique_name = name
             while unique_name in self.names or (number > 1 and unique_name in {*self.definitions, *self.rows}):
                 number += 1
                 unique_name = f"{name}_{number}"
@@ -135,7 +136,8 @@ class _FunctionWalk:
         if definition.name not in module.scope_names:
             module.scope_names[definition.name] = ScopeNames.of(definition)
         names = module.scope_names[definition.name]
-        self.names, self.read = names.every, names.read
+        self.names = names.every
+        self.read = names.read
         self.parameters = {argument.arg for argument in definition.args.args}
         self.fresh_names: set[str] = set()
         self.values = Expressions(
@@ -163,7 +165,8 @@ class _FunctionWalk:
         # again until no type changes, which ends because types only widen.
         self.has_widened = True
         while self.has_widened:
-            self.has_widened, self.flags = False, 0
+            self.has_widened = False
+            self.flags = 0
             self.fresh_names.clear()
             body = self.block(self.definition.body)
         for parameter, kind in zip(names, types, strict=True):
@@ -240,7 +243,8 @@ class _FunctionWalk:
     def do_for(self, node: ast.For) -> list[Statement]:
         if not isinstance(node.target, ast.Name):
             raise self.refused(node, f"the loop variable '{ast.unparse(node.target)}' must be a single name")
-        call, name = node.iter, node.target.id
+        call = node.iter
+        name = node.target.id
         if not (isinstance(call, ast.Call) and ast.unparse(call.func) == "range"):
             return self.loop_over_items(name, node)
         bounds = [self.values.integer(bound) for bound in call.args]
@@ -255,7 +259,8 @@ class _FunctionWalk:
         if stop.reads & {name, *stored_names(node.body)}:
             # Python asks for the end of a range once.
             end = self.fresh(f"{name}_stop", INT)
-            before, stop = [self.assign(end, stop, node)], Term("name", INT, (), end)
+            before = [self.assign(end, stop, node)]
+            stop = Term("name", INT, (), end)
         return [*before, *self.loop(node, lambda: typed.CountedLoop(name, start, stop, step, self.block(node.body)))]
 
     def loop_over_items(self, name: str, node: ast.For) -> list[Statement]:
@@ -301,7 +306,8 @@ class _FunctionWalk:
     def do_assign(self, node: ast.Assign) -> list[Statement]:
         if len(node.targets) != 1:
             raise self.refused(node, "an assignment must have one target; write one assignment for each name")
-        target, right = node.targets[0], node.value
+        target = node.targets[0]
+        right = node.value
         called = right.func if isinstance(right, ast.Call) else None
         if isinstance(target, ast.Name) and isinstance(called, ast.Name) and called.id == "empty_rows":
             # A local array, whose shape is a literal.

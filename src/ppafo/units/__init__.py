@@ -116,8 +116,10 @@ def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
     """Return scale and offset to an SI unit, and a flag to add the atmosphere."""
     if unit == SI:
         return Decimal(1), Decimal(0), False
-    wanted, needed = read_unit(si_unit), _NEEDED.get(si_unit, f"a unit like '{si_unit}' is needed")
-    flow, is_mass_flow = flow_of(unit), wanted.dimensions == MASS_FLOW
+    wanted = read_unit(si_unit)
+    needed = _NEEDED.get(si_unit, f"a unit like '{si_unit}' is needed")
+    flow = flow_of(unit)
+    is_mass_flow = wanted.dimensions == MASS_FLOW
     if flow.is_normal and not flow.is_stated and not is_mass_flow:
         raise UnitError(f"unit '{unit}' does not fit: {needed}")
     given = read_unit(unit, is_mass_flow)

@@ -131,7 +131,8 @@ def quantity_of_unit(si_unit: str) -> str:
 
 def shown_unit(si_unit: str, chosen: Mapping[str, str] | None = None) -> str:
     """Return the display unit of an SI unit, ``chosen`` as by ``shown_in`` or by default; "" for a plain number."""
-    chosen, si_unit = _chosen.get() if chosen is None else chosen, _WRITTEN.get(si_unit, si_unit)
+    chosen = _chosen.get() if chosen is None else chosen
+    si_unit = _WRITTEN.get(si_unit, si_unit)
     if si_unit in chosen:
         return chosen[si_unit]
     if si_unit in ("N/Pa", "N m/Pa"):
@@ -152,7 +153,8 @@ def shown_value(
 
     Gauge pressures are relative to ``atmosphere`` [Pa absolute], by default the atmosphere of the device in force.
     """
-    known, unit = _WRITTEN.get(si_unit, si_unit), unit or shown_unit(si_unit)
+    known = _WRITTEN.get(si_unit, si_unit)
+    unit = unit or shown_unit(si_unit)
     if unit in (known, "") or not math.isfinite(value):
         return 0.0 if abs(value) <= zero else float(value)
     room = gauge_zero() if atmosphere is None else atmosphere
@@ -166,7 +168,8 @@ def shown_text(value: float, si_unit: str, form: str = ".6g", atmosphere: float 
     >>> shown_text(5.201e-4, "m^2"), shown_text(4.0e5, "Pa_a", unit="bar_a"), shown_text(1.0e-17, "N m")
     ('520.1 mm^2', '4 bar_a', '0 N m')
     """
-    quantity, unit = quantity_of_unit(si_unit), unit or shown_unit(si_unit)
+    quantity = quantity_of_unit(si_unit)
+    unit = unit or shown_unit(si_unit)
     zero = QUANTITIES[quantity].zero if quantity else 0.0
     return f"{without_exponent(shown_value(value, si_unit, unit, atmosphere, zero), form)} {unit}".rstrip()
 

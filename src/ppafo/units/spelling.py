@@ -158,12 +158,15 @@ class WrittenFlow(NamedTuple):
 
 def flow_of(unit: str) -> WrittenFlow:
     """Split a unit into volume flow, whether it is a normal or standard one, condition and gases."""
-    text, words = unit.strip(), ""
+    text = unit.strip()
+    words = ""
     if match := _BEHIND.fullmatch(text):
-        text, words = match["flow"] or match["bare"], match["words"] or match["name"] or ""
+        text = match["flow"] or match["bare"]
+        words = match["words"] or match["name"] or ""
     said = [word.strip() for word in _split(words) if word.strip()]
     gases = tuple(word for word in said if word.lower() in _GASES or word.endswith("/mol"))
-    flow, normal = text, _NORMAL.fullmatch(text)
+    flow = text
+    normal = _NORMAL.fullmatch(text)
     if normal:
         flow = (normal["word"] or "").upper() or normal["volume"] or f"{normal['milli']}L{normal['per']}"
     return WrittenFlow(text, flow, normal is not None, ", ".join(word for word in said if word not in gases), gases)
@@ -314,7 +317,8 @@ def split_pressure_kind(unit: str) -> tuple[str, str]:
         normal = pattern.sub(replacement, normal)
     if match := _KIND.fullmatch(normal):
         letter = match["word"][0].lower()
-        normal, kind = match["unit"].rstrip(" _"), _LETTER.get(letter, letter)
+        normal = match["unit"].rstrip(" _")
+        kind = _LETTER.get(letter, letter)
     # A plain number has this unit in tables and results.
     normal = "1" if normal == "-" else re.sub(r"[A-Za-z]+", lambda word: _symbol(word[0]) or word[0], normal)
     if normal and (len(normal) > _LONGEST or not _EXPRESSION.fullmatch(normal)):

@@ -183,19 +183,26 @@ def agreement_of(request: Replay, replayed: Replayed, known_delay: float = 0.0) 
 
     Raises DataError if no channel can be compared.
     """
-    measured, device, settings, model = request.measured, request.device, request.settings, replayed.recording
-    recorded, longest, supply = measured.recording, settings.longest_delay, device.supply
+    measured = request.measured
+    device = request.device
+    settings = request.settings
+    model = replayed.recording
+    recorded = measured.recording
+    longest = settings.longest_delay
+    supply = device.supply
     read = {name: recorded[name] for name in recorded.names}
     if PRESSURE_1 in recorded and PRESSURE_2 in recorded:
         read[PRESSURE_DIFFERENCE] = recorded[PRESSURE_1] - recorded[PRESSURE_2]
     # Where the vane is locked, or where there is none, some channels carry no information.
-    of_volume, is_locked = settings.volume is not None, settings.motion == "locked"
+    of_volume = settings.volume is not None
+    is_locked = settings.motion == "locked"
     informative = [PRESSURE_1] if of_volume else [name for name in COMPARED if not is_locked or name != ANGLE]
     samples = {name: read[name] for name in informative if name in read and name not in request.inputs}
     if not samples:
         needed = "pressure_1" if of_volume else "a channel other than the prescribed angle"
         raise DataError(f"{measured.file}: no channel can be compared; the recording needs {needed}")
-    gauge, gauge_of_set = supply_gauge(recorded, device), supply.pressure - supply.atmospheric_pressure
+    gauge = supply_gauge(recorded, device)
+    gauge_of_set = supply.pressure - supply.atmospheric_pressure
     remarks = list(measured.remarks)
     if SUPPLY in recorded and abs(gauge - gauge_of_set) > _OTHER_SUPPLY * gauge_of_set:
         times = f"{gauge / gauge_of_set:.3g} times the gauge pressure of" if gauge_of_set > 0.0 else "not"
@@ -214,7 +221,8 @@ def agreement_of(request: Replay, replayed: Replayed, known_delay: float = 0.0) 
     spans = {name: full_range(name, device, gauge) for name in samples}
     # Sums and multiples of two others do not count twice.
     sensed = [name for name in (ANGLE, PRESSURE_1, PRESSURE_2) if name in samples] or list(samples)[:1]
-    lag, delay = 0.0, known_delay
+    lag = 0.0
+    delay = known_delay
     if not known_delay and longest > 0.0:
         curves = [(samples[name], model[name], spans[name]) for name in sensed]
         lag = _estimated_lag(recorded.time, model.time, curves, longest)
@@ -298,7 +306,8 @@ def _estimated_lag(
     value = float(minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": _ACCURACY * limit}).x)
     # A delay counts where it explains more than noise and the accuracy of the engine could.
     least = cost(value)
-    gain, samples = cost(0.0) - least, len(curves) * times[thinned].size
+    gain = cost(0.0) - least
+    samples = len(curves) * times[thinned].size
     is_significant = gain > _SMALLEST_GAIN and gain * samples > _MINIMUM_GAIN * least
     is_seen = abs(value) >= _RESOLUTION * float(np.median(np.diff(times[thinned])))
     return value if is_significant and is_seen else 0.0

@@ -229,8 +229,10 @@ def joined(first: ModelChange, second: ModelChange) -> ModelChange:
             about=other.about if other.gain != 1.0 else sensor.about,
             delay=sensor.delay + other.delay,
         )
-    numbers, effects = {**second.numbers, **first.numbers}, {**second.effects, **first.effects}
-    delay, clock = first.delay + second.delay, first.clock * second.clock
+    numbers = {**second.numbers, **first.numbers}
+    effects = {**second.effects, **first.effects}
+    delay = first.delay + second.delay
+    clock = first.clock * second.clock
     return replace(first, sensors=sensors, numbers=numbers, effects=effects, delay=delay, clock=clock)
 
 
@@ -278,7 +280,8 @@ def record_of(agreement: RecordingAgreement) -> Record:
     words = []
     has_few = True
     for row, channel in enumerate(compared):
-        values, residuals = channel.values, channel.residuals
+        values = channel.values
+        residuals = channel.residuals
         # Samples in a channel that the model explains are right, however they look; so are those of one that stands
         # still with the model, but for its zero.
         zero = usual_zero(channel.channel, agreement.request.device)
@@ -324,13 +327,15 @@ def _wrong_samples(channel: ChannelAgreement, times: Floats) -> tuple[str, NDArr
     Samples are clipped at the least or largest value if it is repeated more often than by chance. A coarse converter
     repeats inner values too. Agreement of the other channels tells a stop of the vane from clipping.
     """
-    values, count = channel.values, len(channel.values)
+    values = channel.values
+    count = len(channel.values)
     if np.ptp(values) == 0.0:
         locked = argument_text("motion", "locked")
         other_cause = f"the vane was locked ({locked}), or " if channel.channel == ANGLE else ""
         return f"never changes: {other_cause}the sensor is dead or not connected", np.ones(count, dtype=bool), False
     run_ends = np.append(np.flatnonzero(np.diff(values)), count - 1)
-    lengths, levels = np.diff(run_ends, prepend=-1), values[run_ends]
+    lengths = np.diff(run_ends, prepend=-1)
+    levels = values[run_ends]
     ends = {"least": values.min(), "largest": values.max()}
     inner = lengths[(levels > ends["least"]) & (levels < ends["largest"])]
     # Chance that a sample repeats the one before it.
@@ -362,7 +367,8 @@ def at_rate(recording: Recording, rate: float) -> Recording:
 
 def readings_of(record: Record, replayed: Replayed, change: ModelChange, offset: float) -> Floats:
     """Return modelled readings divided by noise (channels, samples) under a change, delayed by ``offset`` [s]."""
-    time, model = record.agreement.measured.time, replayed.recording
+    time = record.agreement.measured.time
+    model = replayed.recording
     true_time = time[0] + (time - time[0]) / change.clock
     rows = []
     for name in record.channels:
@@ -385,7 +391,8 @@ def residuals_of(record: Record, replayed: Replayed, change: ModelChange) -> Sca
     longest = 0.0 if change.has_delay else record.agreement.request.settings.longest_delay
     options = []
     for start in {0.0, record.agreement.delay} if longest > 0.0 else {0.0}:
-        delay, errors = start, np.zeros(0)
+        delay = start
+        errors = np.zeros(0)
         for _ in range(STEPS + 1 if longest > 0.0 else 1):
             readings = readings_of(record, replayed, change, delay)
             by_delay = [np.gradient(readings, axis=1)] if longest > 0.0 else []
@@ -393,11 +400,13 @@ def residuals_of(record: Record, replayed: Replayed, change: ModelChange) -> Sca
             columns = [(column * good).ravel() for column in (*by_delay, *record.starts)]
             sizes = _ridge_fit(columns, errors)
             if by_delay:
-                last, free = delay, delay - interval * float(sizes[0])
+                last = delay
+                free = delay - interval * float(sizes[0])
                 delay = min(max(free, 0.0), longest)
                 if delay != free:
                     # At an end of its range the delay is known, and the initial values alone are fitted.
-                    errors, columns = errors - (last - delay) / interval * columns[0], columns[1:]
+                    errors = errors - (last - delay) / interval * columns[0]
+                    columns = columns[1:]
                     sizes = _ridge_fit(columns, errors)
             errors = errors - sum(size * column for size, column in zip(sizes, columns, strict=True))
         options.append(errors)
@@ -551,7 +560,8 @@ def of_sensors(agreements: Sequence[RecordingAgreement]) -> Iterator[Cause]:
     Units are not tried for a chamber that stays at atmospheric pressure, which shows no factor, nor against a unit that
     a file declares.
     """
-    recordings, device = [agreement.measured for agreement in agreements], agreements[0].request.device
+    recordings = [agreement.measured for agreement in agreements]
+    device = agreements[0].request.device
     names = set.intersection(*(set(recording.names) for recording in recordings))
     atmosphere = device.supply.atmospheric_pressure
     # A channel moves that departs, measured or modelled, from the atmosphere by more than a zero error.
@@ -595,7 +605,8 @@ def of_sensors(agreements: Sequence[RecordingAgreement]) -> Iterator[Cause]:
         group = "all pressures" if several and channels == pressures else " and ".join(channels)
         seems = f"{group} {'seem' if several else 'seems'}"
         if size:
-            words, zeros = f"the zero of {group} seems to be off by {{:+.3g}} {unit}", [size * part for part in _ZEROS]
+            words = f"the zero of {group} seems to be off by {{:+.3g}} {unit}"
+            zeros = [size * part for part in _ZEROS]
             yield row(channels, "zero", f"zero of {group}", words, *zeros, shown=shown, usual=usual.zero)
             words = f"{seems} to read {{:.4g}} times the true value"
             yield row(channels, "gain", f"gain of {group}", words, *_GAINS, about=about, usual=usual.gain)
@@ -611,7 +622,8 @@ def of_sensors(agreements: Sequence[RecordingAgreement]) -> Iterator[Cause]:
     sensors = [name for name in SENSORS if name in names]
     # Of one sensor alone the delay is the one of all, which is taken out.
     for name in sensors if len(sensors) > 1 else ():
-        words, usual_delay = f"{name} seems to lag the other channels by {{:.3g}} ms", usual_errors(name).delay
+        words = f"{name} seems to lag the other channels by {{:.3g}} ms"
+        usual_delay = usual_errors(name).delay
         yield row([name], "delay", f"delay of {name}", words, *_DELAYS, shown=1.0e3, usual=usual_delay)
     # A delay is no ratio: its magnitude is below 0, as that of a lead is.
     delays, leads = (tuple(-time for time in times) for times in (_LONG_DELAYS, _SHIFTS))
@@ -621,7 +633,8 @@ def of_sensors(agreements: Sequence[RecordingAgreement]) -> Iterator[Cause]:
     yield Cause("lead of all sensors", words, lambda time: ModelChange(delay=time), leads, shown=-1.0e3)
     words = "the clock of the recording seems to run {:.4g} times as fast"
     yield Cause("rate of the clock", words, lambda rate: ModelChange(clock=rate), _RATES)
-    swapped, has_both = ModelChange(is_swapped=True), len(chambers) > 1
+    swapped = ModelChange(is_swapped=True)
+    has_both = len(chambers) > 1
     if has_both:
         yield Cause("swap", "pressure_1 and pressure_2 seem to be swapped", lambda _: swapped)
     for name in (COMMAND, EXTERNAL_TORQUE):
@@ -640,7 +653,8 @@ def of_sensors(agreements: Sequence[RecordingAgreement]) -> Iterator[Cause]:
 
 def of_numbers(request: Replay) -> Iterator[Cause]:
     """Yield every number of the set, 0 or not, with trial values, and a wrong atmosphere under gauge sensors."""
-    device, recording = request.device, request.measured.recording
+    device = request.device
+    recording = request.measured.recording
     scenario = replace(replayed_scenario(request), device=device)
     # Supply pressures that a replay follows in the recording, whatever the set has.
     followed = (
@@ -657,10 +671,14 @@ def of_numbers(request: Replay) -> Iterator[Cause]:
             by_section[section].append((path, quantity))
     for path, quantity in chain.from_iterable(by_section.values()):
         value = number_at(scenario, path)
-        words, base, trials = "{} seems to be {{:.3g}} times the model's value", value, _FACTORS
+        words = "{} seems to be {{:.3g}} times the model's value"
+        base = value
+        trials = _FACTORS
         if value == 0.0:
             sign = "above" if quantity.minimum == 0.0 else "other than"
-            words, base, trials = f"{{}} seems to be {sign} 0", 1.0, _OFF.get(quantity.unit, ())
+            words = f"{{}} seems to be {sign} 0"
+            base = 1.0
+            trials = _OFF.get(quantity.unit, ())
         elif path in _OF_GASES:
             trials = tuple((np.geomspace(*_OF_GASES[path], 5) / value).tolist())
         trials = tuple(size for size in trials if quantity.minimum <= size * base <= quantity.maximum)
@@ -768,7 +786,8 @@ def causes_of(agreements: Sequence[RecordingAgreement], report: Report = report_
         # Hundreds of replays of a minute each would take minutes of computing time.
         return Diagnosis(tried=len(tried), kinds=_TRIED_IN_LONG_RECORDINGS)
     # Numbers of the set are compared with sensors: the gain of a command is the area of its valve.
-    rows, lacking = [*of_sensors(agreements), *of_numbers(request)], [*of_effects(request.device)]
+    rows = [*of_sensors(agreements), *of_numbers(request)]
+    lacking = [*of_effects(request.device)]
     if is_measured:
         rows, lacking = ([row for row in each if not row.first.is_of_motion] for each in (rows, lacking))
     sized = [row for row in rows if row.has_size]
@@ -786,7 +805,8 @@ def causes_of(agreements: Sequence[RecordingAgreement], report: Report = report_
         usual = [cause for cause in together if cause.explains and cause.gain > least]
     if usual and not is_late:
         return Diagnosis(search.best_of(usual), None, len(tried) + len(of_bench))
-    exchanges, not_of_bench = [row for row in rows if not row.has_size], [row for row in sized if not row.usual]
+    exchanges = [row for row in rows if not row.has_size]
+    not_of_bench = [row for row in sized if not row.usual]
     for compared, untried in (([], exchanges), (of_bench, [*not_of_bench, *lacking])):
         tried += [*compared, *search.compared(untried)]
         if any(cause.explains for cause in tried):
@@ -820,7 +840,8 @@ def _in_other_unit(agreements: Sequence[RecordingAgreement]) -> Cause | None:
         and (after.passes or after.rms**2 < (1.0 - EXPLAINED_FRACTION) * after.variation**2)
         for before, after in pairs
     )
-    left, words = max(after.in_noise for _, after in pairs), f"times seem to be in {name}"
+    left = max(after.in_noise for _, after in pairs)
+    words = f"times seem to be in {name}"
     cause = Cause(name, words, lambda rate: ModelChange(clock=rate), size=_TIMES[name], left=left)
     return cause if explains_all else None
 
@@ -905,7 +926,8 @@ class CauseSearch:
             changes = [row.at(size) for row, size in trials]
             for (row, size), residuals in zip(trials, self.evaluated(changes), strict=True):
                 if residuals is not None:
-                    cause, previous = self._at(row, size, residuals), best.get(row.name)
+                    cause = self._at(row, size, residuals)
+                    previous = best.get(row.name)
                     # Sizes that leave nothing but noise are equal: one inside the grid is known better than its ends.
                     if previous is None or (cause.gain, cause.is_inside) > (previous.gain, previous.is_inside):
                         best[row.name] = cause
@@ -990,7 +1012,8 @@ class CauseSearch:
         if not others:
             return False
         # A tangent: of a logarithm the sizes themselves are no measure.
-        errors, step = first.residuals.errors, _DIFFERENCE * float(np.diff(sorted(first.grid)).min())
+        errors = first.residuals.errors
+        step = _DIFFERENCE * float(np.diff(sorted(first.grid)).min())
         moved = self._slopes([(first, first.at(first.size + step), 1.0)])
         along_first = moved[0].slope if moved else np.zeros_like(errors)
         along_first /= max(float(np.linalg.norm(along_first)), _SMALLEST)
@@ -1018,7 +1041,8 @@ class CauseSearch:
         which cost no penalty: their magnitudes come from a linear fit, and a replay verifies each.
         """
         explaining = [cause for cause in tried if cause.explains]
-        first, known = max(explaining, key=lambda cause: cause.gain), {cause.name for cause in explaining}
+        first = max(explaining, key=lambda cause: cause.gain)
+        known = {cause.name for cause in explaining}
         # One Jacobian, at the first cause, shows what a second one would add and what could replace it. A cause without
         # a size to fit, a swap or a sign, cannot pass for two other changes.
         is_fitted = first.has_size and not first.is_of_samples
@@ -1051,7 +1075,8 @@ class CauseSearch:
         These have about the same gain, or differ by no more than the engine errs. ``others`` explain the recordings
         only together with usual sensor errors, and are listed last.
         """
-        best, alone = max(named, key=lambda cause: cause.gain), {cause.name for cause in named}
+        best = max(named, key=lambda cause: cause.gain)
+        alone = {cause.name for cause in named}
         alike = [
             cause
             for cause in (*named, *others)
@@ -1111,8 +1136,11 @@ def _request(record: Record, change: ModelChange) -> Replay:
     change states.
     """
     request = record.agreement.request
-    measured, device, settings = request.measured, request.device, request.settings
-    recording, initial = measured.recording, dict(settings.initial)
+    measured = request.measured
+    device = request.device
+    settings = request.settings
+    recording = measured.recording
+    initial = dict(settings.initial)
     for name, sensor in change.sensors.items():
         if name in recording:
             values = sensor.true(recording[name])
@@ -1124,7 +1152,9 @@ def _request(record: Record, change: ModelChange) -> Replay:
     if change.clock != 1.0:
         recording = at_rate(recording, change.clock)
     if change.start is not None:
-        actuator, supply, count = device.actuator, device.supply, samples_at_rest(measured.recording)
+        actuator = device.actuator
+        supply = device.supply
+        count = samples_at_rest(measured.recording)
         for name, values, good in zip(record.channels, record.values * record.noise[:, None], record.good, strict=True):
             valid = values[:count][good[:count] > 0.0]
             if name in SENSORS and len(valid) < count:
@@ -1155,9 +1185,11 @@ def _bounded(causes: Sequence[Cause], errors: Floats) -> list[Cause]:
     limits = np.array([cause.usual for cause in causes])
     # In units of its limit, or of its slope, each has one size, whatever its own unit is.
     norms = np.array([max(float(np.linalg.norm(cause.slope)), _SMALLEST) for cause in causes])
-    scales, limits = np.where(np.isfinite(limits), limits, 1.0 / norms), np.where(np.isfinite(limits), 1.0, math.inf)
+    scales = np.where(np.isfinite(limits), limits, 1.0 / norms)
+    limits = np.where(np.isfinite(limits), 1.0, math.inf)
     columns = np.stack([cause.slope for cause in causes], axis=1) * scales
     prior = np.diag(np.where(np.isfinite(limits), 1.0 / deviation_of_limit(1.0), 0.0))
-    rows, right_side = np.concatenate([columns, prior]), np.concatenate([-errors, np.zeros(len(limits))])
+    rows = np.concatenate([columns, prior])
+    right_side = np.concatenate([-errors, np.zeros(len(limits))])
     sizes = (lsq_linear(rows, right_side, (-limits, limits)).x * scales).tolist()
     return [replace(cause, size=size) for cause, size in zip(causes, sizes, strict=True)]

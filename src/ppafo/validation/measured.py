@@ -65,13 +65,15 @@ def read_measured(
     a model.
     """
     # Read for a folder too, which needs none: a name that is wrong is said whatever else is read.
-    atmosphere, mapped = device.supply.atmospheric_pressure, None if columns is None else column_map_of(columns)
+    atmosphere = device.supply.atmospheric_pressure
+    mapped = None if columns is None else column_map_of(columns)
     if not isinstance(source, str | Path):
         recording = source if isinstance(source, Recording) else read_recording(source, atmosphere=atmosphere)
         file = recording.label
         content = np.concatenate([recording.time, *(recording[name] for name in sorted(recording.names))]).tobytes()
     else:
-        file, place = str(source), Path(source)
+        file = str(source)
+        place = Path(source)
         if mapped is None or place.is_dir():
             recording = read_recording(place, atmosphere=atmosphere)
         else:
@@ -102,10 +104,12 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     check_gaps(recording, file)
     check_command(recording, file)
     # Values out of reach of the device are a damaged line, or a unit wrong by powers of ten.
-    supply, supplies = device.supply, (SUPPLY, DORSIFLEXION_SUPPLY)
+    supply = device.supply
+    supplies = (SUPPLY, DORSIFLEXION_SUPPLY)
     highest = max(supply.pressure, supply.dorsiflexion_pressure)
     for name in (name for name in (*supplies, *COMPARED) if name in recording):
-        most, values = highest if name in supplies else full_range(name, device, highest), recording[name]
+        most = highest if name in supplies else full_range(name, device, highest)
+        values = recording[name]
         worst = int(np.argmax(np.abs(values)))
         if abs(values[worst]) > _MAXIMUM_RANGES * most:
             raise DataError(
@@ -130,7 +134,8 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     intervals = np.diff(recording.time)
     wide = np.flatnonzero(intervals > _REMARKED_GAP * np.median(intervals))
     if wide.size:
-        gaps, first = count_of(wide.size, "gap"), float(recording.time[wide[0]])
+        gaps = count_of(wide.size, "gap")
+        first = float(recording.time[wide[0]])
         remarks.append(f"{gaps} in time, the first after {first:.6g} s; inputs were constant across gaps")
     return MeasuredRecording(file, sha256, recording, tuple(remarks))
 

@@ -51,7 +51,8 @@ class Replay:
     @property
     def inputs(self) -> tuple[str, ...]:
         """Recorded channels used as inputs; external torque is an input of a free vane only."""
-        motion, recording = self.settings.motion, self.measured.recording
+        motion = self.settings.motion
+        recording = self.measured.recording
         names = (SUPPLY, DORSIFLEXION_SUPPLY, *([EXTERNAL_TORQUE] if motion == "free" else []))
         angle = (ANGLE,) if motion == "measured" else ()
         return (COMMAND, *(name for name in names if name in recording), *angle)
@@ -93,7 +94,8 @@ def replay_together(requests: Sequence[Replay]) -> list[Replayed | PpafoError]:
 
 def _replayed(request: Replay, run: Run, record: Floats, ends: Floats) -> Replayed | SimulationError:
     """Return a replay from its record (records, rows) and final state (rows,), or SimulationError if it diverged."""
-    recorded, rows = request.measured.recording, state_row_numbers(run)
+    recorded = request.measured.recording
+    rows = state_row_numbers(run)
     failure_time = float(ends[rows["result.failure_time"]])
     if failure_time < NEVER_FAILED or not np.isfinite(record).all():
         until = min(failure_time, run.step * run.step_count)
@@ -122,7 +124,9 @@ def replayed_scenario(request: Replay) -> Scenario:
 
     A measured angle is prescribed later, when the run is planned.
     """
-    recording, start, settings = request.measured.recording, request.start, request.settings
+    recording = request.measured.recording
+    start = request.start
+    settings = request.settings
     motion: FreeMotion | PrescribedMotion | None = None
     if settings.motion == "locked":
         motion = locked_vane(start.angle)

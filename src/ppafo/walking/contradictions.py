@@ -48,8 +48,11 @@ BEYOND_STOP = math.radians(5.0)
 
 def contradictions(scenario: Scenario) -> Iterator[Contradiction]:
     """Yield the check of every pair of numbers that could contradict each other, with its result."""
-    motion, actuator = walk_of(scenario), scenario.device.actuator
-    gait, lowest, highest = motion.gait, actuator.angle_min, actuator.angle_max
+    motion = walk_of(scenario)
+    actuator = scenario.device.actuator
+    gait = motion.gait
+    lowest = actuator.angle_min
+    highest = actuator.angle_max
     low, high = angles_of_gait(scenario)
     needed = f"the gait needs {math.degrees(low):.0f} to {math.degrees(high):.0f} deg"
     yield Contradiction(
@@ -62,12 +65,15 @@ def contradictions(scenario: Scenario) -> Iterator[Contradiction]:
         lowest > low + BEYOND_STOP,
         lambda run: f"{needed}, but the lower stop is at {_text(lowest, run, 'rad')}",
     )
-    settings, valve, kind = scenario.controller.settings, scenario.device.valve.kind, scenario.controller.kind
+    settings = scenario.controller.settings
+    valve = scenario.device.valve.kind
+    kind = scenario.controller.kind
     numbers = {f"controller.{name}": number for name, number in settings.items()}
     numbers |= {f"wearer.{name}": getattr(motion.wearer, name) for name in Wearer.__dataclass_fields__}
     for pair in PAIRS:
         if pair.path in numbers and pair.other in numbers:
-            number, other = numbers[pair.path], numbers[pair.other]
+            number = numbers[pair.path]
+            other = numbers[pair.other]
 
             def reason(run: int, pair: _Pair = pair, other: Any = other) -> str:
                 return f"must be {pair.relation} {pair.other} = {_text(other, run, pair.unit)}"
@@ -86,7 +92,9 @@ def contradictions(scenario: Scenario) -> Iterator[Contradiction]:
     )
     # A controller with a threshold of force finds the events of the gait by itself.
     if "load_threshold" in settings:
-        stride, first, swing = gait.stride_time, settings["first_stride_time"], settings["swing_angle"]
+        stride = gait.stride_time
+        first = settings["first_stride_time"]
+        swing = settings["swing_angle"]
         yield Contradiction(
             "controller.first_stride_time",
             np.logical_or(first <= SHORTEST_FIRST * stride, first >= LONGEST_FIRST * stride),
@@ -107,7 +115,8 @@ def contradictions(scenario: Scenario) -> Iterator[Contradiction]:
             lambda _run: f"needs force sensors, and gait '{gait.name}' has no vertical_force",
         )
     if "peak_time" in settings:
-        peak, fall = settings["peak_time"], settings["fall_time"]
+        peak = settings["peak_time"]
+        fall = settings["fall_time"]
         yield Contradiction(
             "controller.peak_time",
             peak + fall > 1.0,

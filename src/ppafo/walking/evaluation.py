@@ -47,7 +47,8 @@ def swing_knee_torque(leg: LegParameters, time: Floats, record: Mapping[str, Any
 
     In stance the torque depends on the horizontal ground reaction, which a gait file does not contain.
     """
-    shank, rate = record["walk.now.shank"], record["state.angular_velocity"]
+    shank = record["walk.now.shank"]
+    rate = record["state.angular_velocity"]
     foot = shank - record["state.angle"] + 0.5 * np.pi
     directions = np.sin(shank), np.cos(shank), np.sin(foot), np.cos(foot)
     torque = torque_on_knee(
@@ -68,7 +69,8 @@ def recording_of_walk(
     scenario: Scenario, run: Run, time: Floats, record: Mapping[str, Floats], supply: SupplyCourse | None = None
 ) -> Recording:
     """Return the recording of a walk [SI] from its rows (samples,) by path at times [s]; ``supply`` is its bottle."""
-    walk, gait = run.walk, walk_of(scenario).gait
+    walk = run.walk
+    gait = walk_of(scenario).gait
     assert walk is not None, "a walk has a leg"
     plant = run.plant
     if supply is not None:
@@ -117,7 +119,8 @@ def result_of_walk(scenario: Scenario, run: Run, outcome: BatchResult, supply: S
     """Return the result of a walk from the outcome of its run, up to a divergence; ``supply`` is its bottle."""
     status, time = end_of(run, outcome)
     if status.is_completed and supply is not None and supply.ending.time < run.step * (run.step_count - 0.5):
-        ended, whole = supply.ending, scenario.run.duration
+        ended = supply.ending
+        whole = scenario.run.duration
         status = Status("ended early", ended.time, f"ended after {ended.time:.6g} of {whole:.6g} s: {ended.message}")
         time = time[: max(int(np.searchsorted(time, ended.time)), 1)]
     return _evaluated(scenario, run, time, rows_by_path(run, outcome.record[: time.size]), status, supply)
@@ -161,7 +164,8 @@ def _evaluated(
     values["strides"] = float(whole)
     values["total_gas"] = float(np.ptp(recording["supplied_mass"][[0, -1]]))
     if "reference" in recording:
-        reference, requested = recording["reference"], requested_samples(recording)
+        reference = recording["reference"]
+        requested = requested_samples(recording)
         error = reference - recording["torque"]
         # A controller that requests a torque is judged by how well it gets it in push-off.
         settled = slice(*starts[[SETTLING, -1]]) if starts.size > SETTLING else slice(0)

@@ -90,7 +90,8 @@ def landing_phase(gait: Gait) -> float:
 
 def foot_angles(gait: Gait, phases: Floats) -> Floats:
     """Return the angles [rad] of the measured foot from the horizontal at these phases [strides]."""
-    shank, ankle = truncate(gait.shank_angle), truncate(gait.ankle_angle)
+    shank = truncate(gait.shank_angle)
+    ankle = truncate(gait.ankle_angle)
     return shank.values_at(phases) - ankle.values_at(phases) + 0.5 * math.pi
 
 
@@ -99,7 +100,8 @@ def gait_timing(gait: Gait) -> GaitTiming:
 
     Heel rise and angle of the flat foot are determined from the curves.
     """
-    foot, stance_share = foot_angles(gait, EVENT_PHASES), gait.stance_share
+    foot = foot_angles(gait, EVENT_PHASES)
+    stance_share = gait.stance_share
     ground_angle = float(np.median(foot[(EVENT_PHASES >= FLAT_FROM) & (EVENT_PHASES <= FLAT_TO)]))
     steep = (foot < ground_angle - NEARLY_FLAT) & (EVENT_PHASES > FLAT_TO)
     heel_off = float(EVENT_PHASES[np.argmax(steep)]) if steep.any() else USUAL_HEEL_RISE * stance_share
@@ -160,7 +162,8 @@ class AnklePath:
         return np.asarray(np.interp(phase % 1.0, _GRID, self.up) + over_ankle)
 
     def _sole(self, tilt: Floats, lever: float) -> Floats:
-        along, up = np.cos(tilt), np.sin(tilt)
+        along = np.cos(tilt)
+        up = np.sin(tilt)
         return np.stack([lever * along + self.height * up, lever * up - self.height * along], axis=1)
 
 
@@ -182,7 +185,8 @@ def ankle_path(gait: Gait, timing: GaitTiming, wearer: Wearer) -> AnklePath:
     rolled = np.where(foot > 0.0, on_heel, on_toes)
     last = int(np.searchsorted(_GRID, timing.toe_off)) - 1
     speed = (rolled[last] - rolled[last - 10]) / (_GRID[last] - _GRID[last - 10])
-    way, span = rolled[0] + length - rolled[last], 1.0 - _GRID[last]
+    way = rolled[0] + length - rolled[last]
+    span = 1.0 - _GRID[last]
     fraction = np.clip((_GRID - _GRID[last]) / span, 0.0, 1.0)
     start = speed * span
     cubic = start * fraction + (3.0 * way - 2.0 * start) * fraction**2 + (start - 2.0 * way) * fraction**3

@@ -71,7 +71,8 @@ def build_walk(reading: DocumentReader) -> Scenario:
     if line is not None and bottle is not None:
         line = bottle.fed(line)
     sensors = reading.section("sensors", WALK_SENSORS)
-    name, is_named = document.get("gait", NORMATIVE), "gait" in document
+    name = document.get("gait", NORMATIVE)
+    is_named = "gait" in document
     # A relative path starts in the folder of the document.
     with refused_as(DataError, reading.quote("gait"), DataError):
         gait = load_gait(reading.folder / name if Path(name).suffix == ".toml" else name)
@@ -185,7 +186,8 @@ def load_walk(
     """
     chosen = {"gait": gait, BOTTLE_NAME: bottle}
     named = [f"{path}={from_here(value)}" for path, value in chosen.items() if value is not None]
-    changes, replacing = read_overrides((*overrides, *named), ScenarioError), set_or_load(parameter_set)
+    changes = read_overrides((*overrides, *named), ScenarioError)
+    replacing = set_or_load(parameter_set)
     with at_fault("scenario"):
         request = request_of_file(
             scenario, changes, replacing, SCENARIO_FILE if str(scenario) in list_scenarios() else FILE
@@ -212,7 +214,8 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
             f"{scenario.name}: this walk differs from its file (the walk, the file or the package was changed after "
             f"loading): give {argument_text('bottle')} when loading the walk"
         )
-    content, before = request.document, request.overrides
+    content = request.document
+    before = request.overrides
     if bottle is not None:
         # Another bottle replaces the whole section, including its overrides.
         content = {name: section for name, section in content.items() if name != BOTTLE}

@@ -54,10 +54,12 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     Numbers of both may be arrays (runs,). All runs of an ensemble must need the same program: each of ``flaws`` is 0
     for all runs or for none.
     """
-    motion, scenario = walk_of(scenario), replace(scenario, device=fed_device(scenario))
+    motion = walk_of(scenario)
+    scenario = replace(scenario, device=fed_device(scenario))
     device = scenario.device
     leg = leg_parameters(motion.wearer, heel_rocker(motion.gait, motion.wearer))
-    gait, timing = gait_series(motion.gait), gait_timing(motion.gait)
+    gait = gait_series(motion.gait)
+    timing = gait_timing(motion.gait)
     bare = plant_parameters(device)
     walk = Walk(
         leg=leg,
@@ -67,7 +69,8 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         sensors=gait_sensors_of(scenario),
         initial=of_each(lambda leg: walk_from_strike(gait_at(gait, timing, leg, 0.0)), leg),
     )
-    now, lines = walk.initial.now, scenario.supply_lines
+    now = walk.initial.now
+    lines = scenario.supply_lines
     times = scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
 
     def steps(plant: PlantParameters) -> TimeGrid:
@@ -99,7 +102,8 @@ def stiff_loads(run: Run) -> tuple[Problem, ...]:
     A step uses the load predicted at its end. The prediction converges if within a step the drag reduces the speed of
     the foot by less than twice this speed, and if a spring advances its oscillation by less than 1 rad.
     """
-    program, inertia = run.program, run.plant.inertia
+    program = run.program
+    inertia = run.plant.inertia
     if all(load_torque not in effect.laws for effect in program.effects):
         return ()
 
@@ -113,12 +117,14 @@ def stiff_loads(run: Run) -> tuple[Problem, ...]:
         return damping, (at_angles[1] - at_angles[0]) / (2.0 * SMALL_TURN)
 
     damping, stiffness = of_each(growths, *run.effects, *states_at_start(run))
-    dragged, sprung = 2.0 * inertia / larger(damping, TINY), over_runs(math.sqrt, inertia / larger(stiffness, TINY))
+    dragged = 2.0 * inertia / larger(damping, TINY)
+    sprung = over_runs(math.sqrt, inertia / larger(stiffness, TINY))
     longest = smaller(dragged, sprung)
     names = ", ".join(f"effects.{effect.name}" for effect in program.effects if load_torque in effect.laws)
 
     def line(number: int) -> str:
-        step, most = at(run.step, number), at(longest, number)
+        step = at(run.step, number)
+        most = at(longest, number)
         cause = (
             f"drag of {at(damping, number):.3g} N m s/rad at {FASTEST_FOOT:g} rad/s"
             if at(dragged, number) < at(sprung, number)
@@ -183,7 +189,8 @@ def requests_torque(law: ControllerKind) -> bool:
 
 def fed_device(scenario: Scenario) -> Device:
     """Return the device with the gas temperature of its supply at the start, which is low for a bottle."""
-    bottle, device = walk_of(scenario).bottle, scenario.device
+    bottle = walk_of(scenario).bottle
+    device = scenario.device
     if bottle is None:
         return device
     return replace(device, gas=replace(device.gas, temperature=bottle.offers_first().gas_temperature))

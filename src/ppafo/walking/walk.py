@@ -95,13 +95,16 @@ def walk(
             if is_bad:
                 raise ScenarioError(line(0))
         scenario = with_duration(scenario, 60.0 * minutes)
-    run, motion, custom = plan_run(scenario), walk_of(scenario), scenario.controller.custom
+    run = plan_run(scenario)
+    motion = walk_of(scenario)
+    custom = scenario.controller.custom
     if custom is not None:
         check_no_bottle(scenario)
         return result_of_walk(scenario, run, run_sampled(batch_of(run), custom), None)
     if motion.bottle is None:
         # In parts short enough for interrupts and progress reports.
-        batch, steps = batch_of(run), run.step_count
+        batch = batch_of(run)
+        steps = run.step_count
         block = begin_block(batch, effort_for(batch))
         for done in range(0, steps, STEPS_PER_CALL):
             block.advance(min(STEPS_PER_CALL, steps - done))
@@ -174,10 +177,12 @@ def without_device(configuration: Scenario) -> Scenario:
     The ankle has its own range of motion. The result does not depend on device or valve; bottle and supply lines
     are removed.
     """
-    device, control = configuration.device, Control(event_on_off.OFF.name, {}, configuration.controller.period)
+    device = configuration.device
+    control = Control(event_on_off.OFF.name, {}, configuration.controller.period)
     # No torque and no displacement; the stops of the actuator become the range of the ankle.
     stops = Actuator(0.0, 0.0, *ANKLE_RANGE, _LEG_CHAMBER, _LEG_CHAMBER, 0.0, device.actuator.leak)
-    free, massless = Friction(0.0, 0.0, 0.0), FootPlate(0.0, 0.0)
+    free = Friction(0.0, 0.0, 0.0)
+    massless = FootPlate(0.0, 0.0)
     return replace(
         configuration,
         name=f"{configuration.name}-without",
@@ -192,7 +197,8 @@ def without_device(configuration: Scenario) -> Scenario:
 
 def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:
     """Return the metrics of a walk with a healthy ankle, in SI units; work and muscle moment need a moment curve."""
-    gait, wearer = walk_of(configuration).gait, walk_of(configuration).wearer
+    gait = walk_of(configuration).gait
+    wearer = walk_of(configuration).wearer
     values = {
         # Measured from the healthy gait, whose heel comes first.
         **dict.fromkeys(("toe_clearance", "angle_difference", "toe_landing"), 0.0),

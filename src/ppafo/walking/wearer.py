@@ -116,7 +116,8 @@ SCALING = {
 
 def scaled(leg: Wearer, mass: float, stature: float) -> dict[str, Any]:
     """Return the numbers of a leg [SI] multiplied for a relative body mass and stature [-]."""
-    masses, statures = (1.0, mass), (1.0, stature, stature * stature)
+    masses = (1.0, mass)
+    statures = (1.0, stature, stature * stature)
     return {
         name: getattr(leg, name) * masses[of_mass] * statures[of_stature]
         for name, (of_mass, of_stature) in SCALING.items()
@@ -195,7 +196,8 @@ def read_wearer(reading: DocumentReader, gait: Gait, is_named: bool) -> Wearer:
         subject = replace(subject, **segments)
     quantities = _quantities(subject)
     for quantity in quantities if is_named else ():
-        value, path = getattr(subject, quantity.name), f"wearer.{quantity.name}"
+        value = getattr(subject, quantity.name)
+        path = f"wearer.{quantity.name}"
         is_usable = quantity.minimum <= value <= quantity.maximum
         if not is_usable and value_at(reading.document, path) is None:
             raise ScenarioError(
@@ -221,7 +223,8 @@ def wearer_origin(reading: DocumentReader, gait: Gait, is_named: bool) -> str:
 def who_walks(wearer: Wearer, gait: Gait, origin: str) -> str:
     """Return a line on the wearer, and on the gait's own subject if that is another person."""
     is_subject = origin.startswith("the subject of")
-    said, default_stature = f"wearer: {wearer.body_mass:.4g} kg, {origin}", (gait.stature if is_subject else None)
+    said = f"wearer: {wearer.body_mass:.4g} kg, {origin}"
+    default_stature = gait.stature if is_subject else None
     if abs(wearer.stature - (default_stature or _PAPER.stature)) > _SAME * wearer.stature:
         (low, high), tall = STATURES, wearer.stature
         beyond = "" if low <= tall <= high else f" in the proportions of adults of {low:g} to {high:g} m, extrapolated"

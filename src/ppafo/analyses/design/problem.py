@@ -236,14 +236,17 @@ def load_design(problem: str | Path, *, profile: str | Path | None = None, plugi
     >>> ppafo.load_design("push-off").name
     'push-off'
     """
-    file, folder = label(str(problem)), Path(problem).parent
+    file = label(str(problem))
+    folder = Path(problem).parent
     with at_fault("problem"):
         content = FILE.read(problem)
     document = checked_record(SizingFile, FILE.parse(content, file), file, StudyError, content)
     wrong = list[PpafoError]()
     valves = {}
     bottles = []
-    atmosphere, largest, pressures = STANDARD_ATMOSPHERE, 1.0, []
+    atmosphere = STANDARD_ATMOSPHERE
+    largest = 1.0
+    pressures = []
     with noted_in(wrong):
         if profile:
             with at_fault("profile"):
@@ -281,7 +284,8 @@ def load_design(problem: str | Path, *, profile: str | Path | None = None, plugi
                 f"{file}: pressure.lowest = '{document.pressure.lowest}': must be above atmospheric pressure and below "
                 f"pressure.highest = '{document.pressure.highest}'"
             )
-    use, limit = document.use, document.limits.rms_error
+    use = document.use
+    limit = document.limits.rms_error
     if (use.repetitions is None) == (use.hours is None):
         wrong.append(StudyError(f"{file}: [use]: give either repetitions or hours"))
     with noted_in(wrong), refused_as(StudyError, f"{file}: limits.rms_error = '{limit}'", UnitError):
@@ -330,7 +334,9 @@ def read_profile(table: ProfileSection, folder: Path, where: str) -> RequiredTor
     if bool(table.time or table.torque) == (source is not None):
         raise StudyError(f"{where}: give either a recording, or both time and torque")
     if source is None:
-        time, torque, kind = np.array(table.time), np.array(table.torque), "typed"
+        time = np.array(table.time)
+        torque = np.array(table.torque)
+        kind = "typed"
         if time.size != torque.size or time.size < 2:
             counts = f"time has {time.size} entries and torque has {torque.size}"
             raise StudyError(f"{where}: {counts}; both need the same number of entries, at least two")
@@ -346,12 +352,16 @@ def read_profile(table: ProfileSection, folder: Path, where: str) -> RequiredTor
             gait = load_gait(beside(name.strip(), folder))
             if gait.ankle_moment is None:
                 raise DataError("this gait has no ankle_moment")
-        phases, kind = np.linspace(0.0, 1.0, _STRIDE_SAMPLES), "gait"
-        time, torque = gait.stride_time * phases, wearer.share * wearer.mass * gait.ankle_moment.values_at(phases)
+        phases = np.linspace(0.0, 1.0, _STRIDE_SAMPLES)
+        kind = "gait"
+        time = gait.stride_time * phases
+        torque = wearer.share * wearer.mass * gait.ankle_moment.values_at(phases)
     else:
         with refused_as(StudyError, f"{where}.recording", DataError):
             recording = read_recording(folder / source)
-            time, torque, kind = recording.time - recording.time[0], recording[table.channel], recording.kind
+            time = recording.time - recording.time[0]
+            torque = recording[table.channel]
+            kind = recording.kind
             if (unit := recording.unit(table.channel)) != _TORQUE:
                 raise DataError(f"channel '{table.channel}' has the unit '{unit}'; choose one in {_TORQUE}")
             if len(recording) < 2:

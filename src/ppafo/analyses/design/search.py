@@ -168,7 +168,9 @@ class Sizing:
     @property
     def summary(self) -> str:
         """Suggestion in a sentence, or why there is none."""
-        choice, recording, profile = self.choice, self.recording, self.problem.profile
+        choice = self.choice
+        recording = self.recording
+        profile = self.problem.profile
         if choice is None or recording is None:
             working = [sized for sized in self.valves if sized.works]
             near = min(self.valves, key=lambda sized: np.nan_to_num(sized.error, nan=np.inf))
@@ -193,7 +195,8 @@ class Sizing:
 
     def _cut_peak(self, sized: SizedValve) -> str:
         """Return the fraction of the peak torque that a valve's pressure cuts off; "" for a whole peak."""
-        largest, most = self.problem.profile.largest, self.problem.ceiling(sized.pressure)
+        largest = self.problem.profile.largest
+        most = self.problem.ceiling(sized.pressure)
         if (cut := 1.0 - most / largest) <= _WHOLE_PEAK or sized.error != sized.error:
             return ""
         return f", with {100.0 * cut:.0f} % of the peak cut off (at most {TORQUE.text(most)} of {TORQUE.text(largest)})"
@@ -251,7 +254,10 @@ class Trials:
 
         ``opening`` is a factor on the valve opening [-].
         """
-        problem, scenario, streams, count = self.problem, self.problem.scenario, max(1, self.seeds.size), pressure.size
+        problem = self.problem
+        scenario = self.problem.scenario
+        streams = max(1, self.seeds.size)
+        count = pressure.size
         columns = self.columns(valve, pressure, gains, opening)
         error, gas = np.empty((2, streams, count))
         chunk = max(1, _AT_ONCE // streams)
@@ -281,8 +287,10 @@ class Trials:
         The best set uses the least gas of all sets that keep the error limit; if no set keeps the limit, it has the
         smallest error.
         """
-        sets, first = self.combinations, like - like % self.combinations
-        pressures, gains = np.repeat(pressure, sets), np.tile(first + np.arange(sets), pressure.size)
+        sets = self.combinations
+        first = like - like % self.combinations
+        pressures = np.repeat(pressure, sets)
+        gains = np.tile(first + np.arange(sets), pressure.size)
         trial = self.run(valve, pressures, gains, opening).reshape(pressure.size, sets)
         # Infinite for failed runs: argmin would take nan for the smallest.
         error = np.where(np.isnan(trial["error"]), np.inf, trial["error"])
@@ -299,7 +307,8 @@ class Trials:
         The gains of the scenario fit its own device. For other valves and pressures they are scaled, so that the ratio
         to the gains of the rules in ``control.torque_loop`` stays the same.
         """
-        problem, scenario = self.problem, self.problem.scenario
+        problem = self.problem
+        scenario = self.problem.scenario
         columns = {
             path: np.full(pressure.size, number * (opening if path in _OPENINGS else 1.0))
             for path, number in valve.items()
@@ -332,7 +341,8 @@ def size_for_profile(problem: SizingProblem, threads: int | None, report: Report
         valves.append(_size_valve(trials, name))
     lasting = [(each.bottle.mass, each.gas, row) for row, each in enumerate(valves) if each.bottle]
     # Of valves with the same bottle the one that uses least gas.
-    choice, recording = (valves[min(lasting)[2]] if lasting else None), None
+    choice = valves[min(lasting)[2]] if lasting else None
+    recording = None
     if choice is not None:
         columns = trials.columns(problem.valves[choice.name], np.array([choice.pressure]), np.array([0]))
         numbers = {path: float(values[0]) for path, values in columns.items()} | dict(choice.gains)
@@ -343,9 +353,11 @@ def size_for_profile(problem: SizingProblem, threads: int | None, report: Report
 @in_units(lambda trials, _name: trials.problem.scenario.device.shown)
 def _size_valve(trials: Trials, name: str) -> SizedValve:
     """Return a valve sized at the pressure with the smallest bottle, or at the smallest error if no pressure works."""
-    problem, valve = trials.problem, trials.problem.valves[name]
+    problem = trials.problem
+    valve = trials.problem.valves[name]
     tried = try_pressures(trials, name)
-    works, in_all = tried["works"], tried["gas"] * problem.repetitions * (1.0 + problem.reserve)
+    works = tried["works"]
+    in_all = tried["gas"] * problem.repetitions * (1.0 + problem.reserve)
     bottles = [smallest_bottle(problem.bottles, gas) for gas in in_all.tolist()]
     # The smallest error, where a failed run has none, or the smallest bottle at the lowest pressure that works.
     measure = np.where(np.isnan(tried["error"]), np.inf, tried["error"])
@@ -367,7 +379,8 @@ def _size_valve(trials: Trials, name: str) -> SizedValve:
             smaller = " smaller" * (bottle is not None)
             remarks.append(f"a{smaller} bottle has enough gas, but gets too cold before the end")
         if bottles[chosen] is None:
-            largest, share = problem.bottles[-1].name, problem.bottles[-1].mass / float(in_all[chosen])
+            largest = problem.bottles[-1].name
+            share = problem.bottles[-1].mass / float(in_all[chosen])
             duration = f"{100.0 * share:.0f} % of the use, {share * problem.repetitions:.0f} repetitions"
             remarks.append(f"no bottle is large enough: {largest} lasts for {duration}")
         used = gas * problem.repetitions
@@ -490,7 +503,8 @@ def ceiling_pressure(problem: SizingProblem) -> float:
     """Return the pressure [Pa absolute] below which the clipped peak alone exceeds the error limit; equation (2)."""
     from scipy.optimize import brentq
 
-    atmosphere, for_peak = problem.atmosphere, peak_pressure(problem)
+    atmosphere = problem.atmosphere
+    for_peak = peak_pressure(problem)
     # A limit that is kept without any torque has no root: brentq needs a change of sign.
     if cut_error(problem, atmosphere) <= problem.largest_error:
         return for_peak
@@ -511,7 +525,8 @@ def cut_error(problem: SizingProblem, pressure: float) -> float:
     # The end of a period is its start again and must count once.
     # Two thousand points: the crest of a push-off, a tenth of a stride, still has two hundred.
     time = np.linspace(0.0, problem.profile.period, 2001)[:-1]
-    torque, largest = problem.profile.at(time), problem.ceiling(pressure)
+    torque = problem.profile.at(time)
+    largest = problem.ceiling(pressure)
     return float(np.sqrt(np.mean((torque - np.clip(torque, -largest, largest)) ** 2)))
 
 
@@ -537,7 +552,8 @@ def flow_margin(trials: Trials, valve: Numbers, pressure: float, like: int) -> f
 @in_units(lambda sizing: sizing.problem.scenario.device.shown)
 def finding_of(sizing: Sizing) -> Finding[Sizing]:
     """Return a sizing study as a finding; not passed if there is no suggestion."""
-    problem, profile = sizing.problem, sizing.problem.profile
+    problem = sizing.problem
+    profile = sizing.problem.profile
     knots = f", {profile.knot_times.size} knots, to {TORQUE.text(profile.table_error)}" if profile.table_error else ""
     requirements = (
         f"profile of {TIME.text(profile.period, '.3g')} with up to {TORQUE.text(profile.largest)} "
@@ -581,7 +597,8 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
 
 def _tables(sizing: Sizing) -> tuple[Section, Section]:
     """Return the table of all valves, and the table of margins and gains of the valves that work."""
-    gas, fraction = Kind("", "kg", "gas mass", ".3g"), Kind(quantity="fraction", form=".0f")
+    gas = Kind("", "kg", "gas mass", ".3g")
+    fraction = Kind(quantity="fraction", form=".0f")
     quantities = CONTROLLERS[sizing.problem.scenario.controller.kind].quantities
     units = {f"controller.{quantity.name}": quantity.unit for quantity in quantities}
     rows = list[Any]()
@@ -599,7 +616,8 @@ def _tables(sizing: Sizing) -> tuple[Section, Section]:
             for path, gain in sized.gains.items()
         )
         margins.append((sized.name, *sized.margins.values(), ", ".join(gains) or "none to choose"))
-    pressures, gases = (("pressure", PRESSURE), ("lowest", PRESSURE)), (("gas per repetition", gas), ("total gas", gas))
+    pressures = (("pressure", PRESSURE), ("lowest", PRESSURE))
+    gases = (("gas per repetition", gas), ("total gas", gas))
     head = ("valve", *pressures, ("RMS error", TORQUE), *gases, "bottle", "limited by")
     fractions = [(f"{name} margin", fraction) for name in ("error", "torque", "flow", "gas")]
     chosen, kept = ([row for row, each in enumerate(of) if each is sizing.choice] for of in (sizing.valves, working))
@@ -616,7 +634,8 @@ def _colours(sizing: Sizing) -> dict[str, str]:
 
 def _pressure_panels(sizing: Sizing) -> list[Panel]:
     """Return panels of error and gas over supply pressure, with a ring at the pressure chosen for each valve."""
-    limit, colours = sizing.problem.largest_error, _colours(sizing)
+    limit = sizing.problem.largest_error
+    colours = _colours(sizing)
     dotted = {"marker": ".", "markersize": 4}
     ringed = {"linestyle": "", "marker": "o", "markersize": 9, "markerfacecolor": "none", "markeredgewidth": 1.4}
     errors = [Mark("level", (), limit, colour=BLACK, style={"linewidth": 1.0, "linestyle": "--"})]
@@ -635,7 +654,8 @@ def _pressure_panels(sizing: Sizing) -> list[Panel]:
             label = "" if rings else "chosen pressure"
             rings.append(Mark("line", [sized.pressure], [sized.error], (), label, colour, ringed))
             gases.append(Mark("line", [sized.pressure], [sized.gas], colour=colour, style=ringed))
-    error_kind, gas_kind = replace(TORQUE, words="RMS error"), Kind("Gas per repetition", "kg", "gas mass", ".3g")
+    error_kind = replace(TORQUE, words="RMS error")
+    gas_kind = Kind("Gas per repetition", "kg", "gas mass", ".3g")
     highest = float(error_kind.values(_MAXIMUM_OF_LIMIT * limit))
     return [
         Panel(
@@ -653,7 +673,8 @@ def _pressure_panels(sizing: Sizing) -> list[Panel]:
 
 def _torque_panels(sizing: Sizing) -> list[Panel]:
     """Return the panel of the prescribed torque and of the suggestion's over time."""
-    times, choice = np.linspace(0.0, sizing.problem.scenario.run.duration, 3001), sizing.choice
+    times = np.linspace(0.0, sizing.problem.scenario.run.duration, 3001)
+    choice = sizing.choice
     prescribed = {"linestyle": REFERENCE.line, "linewidth": 1.2}
     marks = [Mark("line", times, sizing.problem.profile.at(times), (), "prescribed", REFERENCE.colour, prescribed)]
     if choice is not None and sizing.recording is not None:

@@ -125,7 +125,8 @@ class Endurance:
 
     def json_document(self) -> dict[str, Any]:
         """Return the duration, its end and the bottle as plain data in SI units."""
-        bottle, recording = self.bottle, self.recording
+        bottle = self.bottle
+        recording = self.recording
         return {
             "format": "ppafo bottle",
             "schema_version": 2,
@@ -190,15 +191,18 @@ def discharge(
         message = f"the supply pressure was maintained for the whole requested time; {remaining}"
     elif reason == "frozen":
         cold = "the liquid begins to freeze (dry ice)" if has_liquid(bottle.fluid.table) else "the gas is too cold"
-        ending, message = "frozen", f"{cold}, and the property table ends here; {remaining}, {warm}"
+        ending = "frozen"
+        message = f"{cold}, and the property table ends here; {remaining}, {warm}"
     elif flow_margin < pressure_margin and seat_open < OPEN:
         ending = "iced"
         message = f"the regulator is iced: dry ice leaves {100.0 * seat_open:.0f} % of the seat open; {remaining}"
     # The gas of a warm bottle decides between the two: cold is mended by waiting, empty is not.
     elif usable > _NEXT_TO_NOTHING * bottle.mass:
-        ending, message = "too cold", f"the bottle is too cold: {why}; {remaining}, {warm}"
+        ending = "too cold"
+        message = f"the bottle is too cold: {why}; {remaining}, {warm}"
     else:
-        ending, message = "empty", f"the bottle is empty: {why}, even at room temperature; {remaining}"
+        ending = "empty"
+        message = f"the bottle is empty: {why}, even at room temperature; {remaining}"
     return Endurance(
         bottle=bottle,
         schedule=schedule,
@@ -278,7 +282,8 @@ def reserves(bottle: Bottle, peak_flow: float, content: BottleContent, seat_open
 
 def flow_limit(bottle: Bottle, content: BottleContent) -> float:
     """Return the largest flow [kg/s] of the regulator for the content of the bottle."""
-    ratio, gas_constant = bottle.heat_capacity_ratio, bottle.fluid.table.gas_constant
+    ratio = bottle.heat_capacity_ratio
+    gas_constant = bottle.fluid.table.gas_constant
     return regulator_flow_limit(bottle.regulator, content.pressure, content.temperature, ratio, gas_constant)
 
 
@@ -287,8 +292,10 @@ def smallest_mass_when_warm(bottle: Bottle, peak_flow: float, enough: float = ma
 
     ``enough`` is a pressure in the bottle [Pa absolute] that was seen to suffice.
     """
-    table, room = bottle.fluid.table, bottle.room_temperature
-    low, high = 0.0, min(bottle.mass, bottle.volume * densest_gas(table, room))
+    table = bottle.fluid.table
+    room = bottle.room_temperature
+    low = 0.0
+    high = min(bottle.mass, bottle.volume * densest_gas(table, room))
     # Halved until nothing is left to halve: the reserve grows with the mass, though not smoothly where liquid begins.
     for _ in range(60):
         middle = 0.5 * (low + high)
@@ -313,9 +320,12 @@ def gas_of_walk(walk: WalkResult | Path) -> tuple[Scenario, Recording, float]:
         raise DataError(f"{file}: format: must be '{WALK_FORMAT}', as written by 'ppafo walk'")
     if table_at(file, document, "status").get("kind") == "diverged":
         raise DataError(f"{file}: the walk diverged, so its gas use cannot be repeated; give one that ran to its end")
-    configuration, gas = table_at(file, document, "configuration"), table_at(file, document, "metrics", "gas")
+    configuration = table_at(file, document, "configuration")
+    gas = table_at(file, document, "metrics", "gas")
     amount = gas.get("value", 0.0)
-    content, overrides, source = configuration.get("content"), configuration.get("overrides"), configuration.get("file")
+    content = configuration.get("content")
+    overrides = configuration.get("overrides")
+    source = configuration.get("file")
     is_stated = isinstance(source, str | None) and isinstance(amount, int | float) and abs(amount) < _MOST_GAS
     if not (is_stated and isinstance(content, dict) and isinstance(overrides, list)):
         raise DataError(f"{file}: does not state the walk and its gas; repeat it with 'ppafo walk'")
@@ -346,10 +356,12 @@ def on_walk(
     seconds = min(math.ceil(schedule.longest / stride) * stride, seconds_of_run)
     repeated = replace(minute, run=replace(minute.run, duration=60.0 * max(1, round(seconds / 60.0))))
     _, course = walk_on_bottle(plan_run(repeated), fed_device(repeated), supply, stride, silent, schedule)
-    end, walked = course.ending, course.walked / stride
+    end = course.ending
+    walked = course.walked / stride
     # A bottle may end before the first stride does.
     strides = max(walked, 1.0e-9)
-    stride_time, mass = course.walked / strides, course.regulated / strides
+    stride_time = course.walked / strides
+    mass = course.regulated / strides
     # An open valve may let gas back into the supply for moments, so the largest flow is a mean over 0.1 s.
     peak = max(largest_flow(recording), gas / walk_of(scenario).gait.stride_time, mass / stride_time)
     # A walk goes on below the pressure that its regulator needs, as long as the torque suffices: warm as cold.
@@ -398,7 +410,8 @@ def of_recording(
         document = read_json(run)
         units = dict(stated_units(run, document))
         gas, supply = (table_at(run, document, "scenario", "device", name) for name in ("gas", "supply"))
-        molar_mass, pressure = gas.get("molar_mass"), supply.get("pressure")
+        molar_mass = gas.get("molar_mass")
+        pressure = supply.get("pressure")
         if isinstance(molar_mass, float) and not is_of_bottle(molar_mass, full):
             raise DataError(
                 f"{run}: the device uses gas of {GRAMS_PER_KILOGRAM * molar_mass:.4g} g/mol, but bottle '{full.name}' "
@@ -435,7 +448,8 @@ def gas_of_recording(recording: Recording, stride_time: float | None) -> tuple[f
         )
     stride = recording.duration if stride_time is None else stride_time
     if not 0.0 < stride <= recording.duration:
-        name, most = argument_text("stride_time"), f"{recording.duration:g} s, the length of the recording"
+        name = argument_text("stride_time")
+        most = f"{recording.duration:g} s, the length of the recording"
         raise DataError(f"{where}: {name} = {stride:g} s: must be above 0 s and at most {most}")
     mean = gain / recording.duration
     return mean * stride, stride, max(mean, largest_flow(recording))
@@ -459,8 +473,11 @@ def largest_flow(recording: Recording) -> float:
 @in_units(lambda results: next(iter(results.values())).shown)
 def finding_of(results: dict[str, Endurance]) -> Finding[Any]:
     """Return the report of a bottle for one gas use, with facts, figure and values, or the table of several."""
-    first, several, gas = next(iter(results.values())), len(results) > 1, Kind(quantity="gas mass", form=".3g")
-    full, counted = first.bottle, first.counted
+    first = next(iter(results.values()))
+    several = len(results) > 1
+    gas = Kind(quantity="gas mass", form=".3g")
+    full = first.bottle
+    counted = first.counted
     if several:
         are_strides = all(use.counted == "stride" for use in results.values())
         counted, time = ("stride", "walking") if are_strides else ("repetition", "run time")
@@ -536,11 +553,14 @@ def finding_of(results: dict[str, Endurance]) -> Finding[Any]:
 
 def _panels(endurance: Endurance) -> list[Panel]:
     """Return the panels of temperature, pressure and gas of the bottle over time."""
-    recording, regulator = endurance.recording, endurance.bottle.regulator
-    time, needed = recording.time, regulator.set_pressure + regulator.pressure_margin
+    recording = endurance.recording
+    regulator = endurance.bottle.regulator
+    time = recording.time
+    needed = regulator.set_pressure + regulator.pressure_margin
     dotted, dashed = ({"linestyle": style, "linewidth": 1.2} for style in (":", "--"))
     warmth = Kind("Temperature of the bottle", "K", "temperature")
-    pressure, mass = Kind("Pressure in the bottle", "Pa_a", "pressure"), Kind("Left in the bottle", "kg", "gas mass")
+    pressure = Kind("Pressure in the bottle", "Pa_a", "pressure")
+    mass = Kind("Left in the bottle", "kg", "gas mass")
     marks = {
         warmth: [Mark("level", (), endurance.bottle.room_temperature, (), "room", GREY, dotted)],
         pressure: [Mark("level", (), needed, (), "needed", VERMILION, dashed)],

@@ -104,11 +104,13 @@ def bottle(
         if not _SHORTEST <= value <= largest:
             limits = f"at least {_SHORTEST:g} s" + f", at most {largest:g} s with such rests" * (value > largest)
             raise ParameterError(f"{argument_text(name)} = {value:g} s: must be {limits}")
-    changes, chosen = tuple(overrides), PAPER_BOTTLE if bottle is None else bottle
+    changes = tuple(overrides)
+    chosen = PAPER_BOTTLE if bottle is None else bottle
     for override in (each for each in read_overrides(changes) if "gas" in each.typed.split(".")):
         raise ParameterError(f"override '{override}': the gas is that of the bottle; choose another bottle")
     if gas_per_stride is not None:
-        time, units = _STRIDE_TIME if stride_time is None else stride_time, units_given({"kg/s": peak_flow})
+        time = _STRIDE_TIME if stride_time is None else stride_time
+        units = units_given({"kg/s": peak_flow})
         if time <= 0.0:
             raise ParameterError(f"{argument_text('stride_time')} = {time:g} s: must be above 0 s")
         with shown_in({**units_in_force(), **units}):

@@ -161,7 +161,9 @@ class LinearModel:
         for name, names, role in ((output, self.outputs, "output"), (source, self.inputs, "input")):
             if name not in names:
                 raise ScenarioError(f"the linear model has no {role} '{one_line(name)}'{known_names(name, names)}")
-        row, column, poles = self.outputs.index(output), self.inputs.index(source), self.poles
+        row = self.outputs.index(output)
+        column = self.inputs.index(source)
+        poles = self.poles
         points = 2.0j * np.pi * np.asarray(frequencies, dtype=np.float64).ravel()
         away = np.min(np.abs(points[:, None] - poles), axis=1)
         # Eigenvalues are that accurate.
@@ -217,7 +219,8 @@ def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
     A time is rounded to the nearest step. Raises ScenarioError for regulated supplies, an on/off valve, a time outside
     the run, and an operating point that does not exist.
     """
-    run, fault = plan_run(scenario), ""
+    run = plan_run(scenario)
+    fault = ""
     if scenario.supply_lines is not None:
         raise ScenarioError(f"{scenario.name}: the linear model assumes a constant supply pressure; omit [supply_line]")
     if run.program.valve.regulates:
@@ -225,10 +228,8 @@ def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
     else:
         # A small change of the command changes openings or their rates somewhere; a table of openings may be flat.
         still = dict(zip(valve_states(run.program), numbers(run.program.valve.state()), strict=True))
-        plant, commands = (
-            plant_of(_without_slew_limit(run), None, still | {"command": 0.0}),
-            np.linspace(-0.95, 0.95, 20),
-        )
+        plant = plant_of(_without_slew_limit(run), None, still | {"command": 0.0})
+        commands = np.linspace(-0.95, 0.95, 20)
         first, second = (
             [plant.valve(still | {"command": command})[1:] for command in (commands + change).tolist()]
             for change in (1.0e-4, 2.0e-4)
@@ -274,10 +275,13 @@ class LinearisedPlant:
 
         A valve state that follows the command immediately does not count as a state: its derivative is 0.
         """
-        run, program, call = self.run, self.run.program, self.functions.of
+        run = self.run
+        program = self.run.program
+        call = self.functions.of
         driven: dict[str, Any] = {name: values[name] for name in (*_SUPPLIES, "external_torque")}
         plant = run.plant._replace(**driven)
-        motion, pressures = (values["angle"], values["angular_velocity"]), (values["pressure_1"], values["pressure_2"])
+        motion = (values["angle"], values["angular_velocity"])
+        pressures = (values["pressure_1"], values["pressure_2"])
         warm = run.thermal if isinstance(run.thermal, ThermalParameters) else None
         temperatures = tuple(values.get(name, 0.0) for name in _TEMPERATURES)
         _, openings, valve_rates = self.valve(values)
@@ -295,7 +299,10 @@ class LinearisedPlant:
 
     def valve(self, values: Mapping[str, float]) -> tuple[Any, Openings, dict[str, float]]:
         """Return the valve state after its immediate changes, the openings [-], and rates of the states by name."""
-        run, call, valve, names = self.run, self.functions.of, self.run.program.valve, valve_states(self.run.program)
+        run = self.run
+        call = self.functions.of
+        valve = self.run.program.valve
+        names = valve_states(self.run.program)
         command = call(at_valve)(values["command"])
         assert valve.rates is not None and valve.instant is not None, "no regulator"  # noqa: PT018
         state = call(valve.settle)(run.valve, rebuilt(valve.state, [values[name] for name in names]), command, 0.0)
@@ -346,7 +353,8 @@ def values_after(scenario: Scenario, run: Run, steps: int) -> dict[str, float]:
             f"{scenario.name}: the run diverges before {steps * run.step:g} s; give an earlier {argument_text('at')}, "
             "or see the cause with 'ppafo simulate'"
         )
-    angle, rate = rows["state.angle"], rows["state.angular_velocity"]
+    angle = rows["state.angle"]
+    rate = rows["state.angular_velocity"]
     if run.program.angle is not None:
         angle, rate, _ = run.program.angle.value(run.path, steps * run.step)
     pressures = pressures_of(run.program.actuator, run.plant, angle, rows["state.mass_1"], rows["state.mass_2"])
@@ -387,7 +395,8 @@ def equilibrium(scenario: Scenario, run: Run) -> dict[str, float]:
     if run.leg is not None and run.program.shank is not CONSTANT:
         raise refusal("there is no equilibrium while the shank moves")
     values = values_after(scenario, run, run.step_count) | {"angular_velocity": 0.0}
-    quantity, level = CONTROLLED[scenario.controlled], None
+    quantity = CONTROLLED[scenario.controlled]
+    level = None
     if not scenario.controller.is_open_loop:
         if quantity.name == ANGLE:
             raise refusal(f"reference.of = '{ANGLE}': an equilibrium needs a reference of torque or pressure")
@@ -399,7 +408,8 @@ def equilibrium(scenario: Scenario, run: Run) -> dict[str, float]:
         raise refusal(f"no equilibrium was found for the command {values['command']:g}")
     if steady is None:
         assert level is not None
-        full, reached = 1.0 if (level > 0.0) != scenario.device.supply.is_vacuum else -1.0, ""
+        full = 1.0 if (level > 0.0) != scenario.device.supply.is_vacuum else -1.0
+        reached = ""
         most = _steady(plant, values | dict.fromkeys(openings, full), quantity, None)
         if most is not None and quantity.name == TORQUE:
             reached = f": with the valve fully open the actuator reaches {plant.at(most)[1]['torque']:.4g} N m"
@@ -437,7 +447,8 @@ def _steady(
         return np.array([*(rate / size_of(name) for name, rate in rates.items()), *wrong])
 
     # Where the search begins: at the end of the run, then about the pressures that have the level.
-    starts, lowest = [dict(values)], plant.run.plant.atmospheric_pressure
+    starts = [dict(values)]
+    lowest = plant.run.plant.atmospheric_pressure
     target = 0.0 if level is None else level - quantity.value(values["angle"], lowest, lowest, 0.0)
     surplus = abs(target) / (plant.run.plant.torque_constant if quantity.name == TORQUE else 1.0)
     for size in (0.01, 0.1, 0.003, 0.03, 0.3, 1.0):
@@ -488,13 +499,15 @@ def one_sided_slopes(function: Callable[[float], Floats], at: float, side: float
     steps = at + side * _LONGEST * size / _SHORTER ** np.arange(_LENGTHS)
     values = np.array([function(step) for step in steps.tolist()])
     slopes = np.diff(values, axis=0) / np.diff(steps)[:, None]
-    best, errors = slopes[-1], np.full(slopes.shape[1], np.inf)
+    best = slopes[-1]
+    errors = np.full(slopes.shape[1], np.inf)
     for order in range(1, _ORDERS + 1):
         better = slopes[1:] + np.diff(slopes, axis=0) / (_SHORTER**order - 1.0)
         error = np.maximum(np.abs(better - slopes[1:]), np.abs(better - slopes[:-1]))
         nearest = np.nanargmin(np.where(np.isfinite(error), error, np.inf), axis=0), np.arange(best.size)
         is_better = error[nearest] < errors
-        best, errors = np.where(is_better, better[nearest], best), np.where(is_better, error[nearest], errors)
+        best = np.where(is_better, better[nearest], best)
+        errors = np.where(is_better, error[nearest], errors)
         slopes = better
     return best, errors
 
@@ -536,7 +549,8 @@ def model_at(scenario: Scenario, run: Run, values: Mapping[str, float], time: fl
     states, changed, outputs = (
         tuple(name for name in names if name not in idle) for names in (rates_here, columns, outputs_here)
     )
-    sizes, count = np.array([size_of(name) for name in changed]), len(states)
+    sizes = np.array([size_of(name) for name in changed])
+    count = len(states)
     largest = np.max(np.maximum(np.abs(near), np.abs(far)) * sizes, axis=1, keepdims=True)
     is_kink = np.any(np.abs(near - far) * sizes > _ON_THE_EDGE * largest + 10.0 * errors * sizes, axis=0)
     near = np.where(np.abs(near) * sizes > _ZERO * largest, near, 0.0)
@@ -574,8 +588,11 @@ def limits_of(
 
     ``has_effect``: False if a small change of the command has no effect
     """
-    joint, plant, direction = scenario.device.joint, linearised.run.plant, linearised.direction
-    openings, room = linearised.valve(at)[1], plant.atmospheric_pressure
+    joint = scenario.device.joint
+    plant = linearised.run.plant
+    direction = linearised.direction
+    openings = linearised.valve(at)[1]
+    room = plant.atmospheric_pressure
     pressure_1, pressure_2, supply_1, supply_2 = (at[name] for name in (*_PRESSURES, *_SUPPLIES))
     chamber = 1 if openings.source_1 > 0.0 else 2
     verb = "evacuates" if min(supply_1, supply_2) < room else "feeds"
@@ -621,7 +638,9 @@ def loop_margins(model: LinearModel, sent_per_opening: float = 1.0) -> LoopMargi
     """
     from scipy.linalg import expm
 
-    scenario, gains, period = model.scenario, model.scenario.controller.settings, model.scenario.controller.period
+    scenario = model.scenario
+    gains = model.scenario.controller.settings
+    period = model.scenario.controller.period
     command = abs(model.values["command"])
     difference = {"pressure_1": 1.0, "pressure_2": -1.0}
     weights = difference if scenario.controlled == "pressure_difference" else {scenario.controlled: 1.0}
@@ -631,7 +650,8 @@ def loop_margins(model: LinearModel, sent_per_opening: float = 1.0) -> LoopMargi
     count = len(model.states)
     sizes = np.array([size_of(name) for name in model.states])
     row = sizes * sum(weight * model.C[model.outputs.index(name)] for name, weight in weights.items())
-    matrix, shown = np.zeros((2 * count + 1, 2 * count + 1)), np.zeros(2 * count)
+    matrix = np.zeros((2 * count + 1, 2 * count + 1))
+    shown = np.zeros(2 * count)
     matrix[:count, :count] = model.A * sizes / sizes[:, None]
     matrix[:count, -1] = model.B[:, 0] / sizes
     for index, name in enumerate(model.states):
@@ -640,14 +660,14 @@ def loop_margins(model: LinearModel, sent_per_opening: float = 1.0) -> LoopMargi
         shown[index + (count if bandwidth else 0)] = row[index]
     # A command that comes within the period (but for rounding) acts on its last part; the one before on the first.
     delay, rest = divmod((model.delays.command + model.delays.signals) / period + 1.0e-9, 1.0)
-    step, early = expm(matrix * period)[:-1], expm(matrix * period * (1.0 - rest))[:-1, -1]
+    step = expm(matrix * period)[:-1]
+    early = expm(matrix * period * (1.0 - rest))[:-1, -1]
     # Of the law, with the integral and the filtered difference as the last two states.
     filtered = period + gains["derivative_filter"]
-    rate, fades = gains["derivative_gain"] / filtered, gains["derivative_filter"] / filtered
-    direct, summed = (
-        gains["proportional_gain"] + gains["integral_gain"] * period + rate,
-        gains["integral_gain"] * period,
-    )
+    rate = gains["derivative_gain"] / filtered
+    fades = gains["derivative_filter"] / filtered
+    direct = gains["proportional_gain"] + gains["integral_gain"] * period + rate
+    summed = gains["integral_gain"] * period
     # At any frequency, such as a quarter of the sample rate.
     if not direct * (shown @ np.linalg.solve(1.0j * np.eye(2 * count) - step[:, :-1], step[:, -1])):
         return None
@@ -656,8 +676,10 @@ def loop_margins(model: LinearModel, sent_per_opening: float = 1.0) -> LoopMargi
     opened = 1.0 - band + (band / SHARPNESS if command < band + (1.0 - band) * SHARPNESS else 0.0)
     steered = error_functions(scenario.controlled, scenario.device.supply.is_vacuum).steered(opened * sent_per_opening)
     # States: plant and sensors, the commands of the samples before, and those of the law.
-    past, plant = 2 * count, np.s_[: 2 * count]
-    whole, law = int(delay), past + int(delay) + 1
+    past = 2 * count
+    plant = np.s_[: 2 * count]
+    whole = int(delay)
+    law = past + int(delay) + 1
 
     def poles_of(factor: float) -> NDArray[np.complex128]:
         """Return the poles [-] of the loop with a factor on the command."""
@@ -671,40 +693,48 @@ def loop_margins(model: LinearModel, sent_per_opening: float = 1.0) -> LoopMargi
         system[law:, law:] = np.diag([1.0, fades])
         return np.asarray(np.linalg.eigvals(system), dtype=np.complex128)
 
-    opens, closed = poles_of(0.0), poles_of(-steered)
+    opens = poles_of(0.0)
+    closed = poles_of(-steered)
     rates = np.array([1.0 / period, *np.abs(model.poles), *np.abs(closed - 1.0) / period])
     slowest = np.min(rates[rates > _INTEGRATOR]) / (2.0 * np.pi)
     frequencies = np.geomspace(1.0e-3 * slowest, 0.5 / period, 20_000)
     z = np.exp(2.0j * np.pi * frequencies * period)[:, None]
     returned = np.prod((z - closed) / (z - opens), axis=1)
     loop = returned - 1.0
-    log_gain, follows = np.log(np.abs(loop)), np.abs(loop / returned)
-
-    def crossings(values: Floats, others: Floats, *ends: tuple[float, float]) -> list[tuple[Any, Any]]:
-        """Return frequencies [Hz] at which ``values`` change sign, with ``others`` there, the ones nearest 0 first."""
-        before = np.flatnonzero(values[:-1] * values[1:] < 0.0)
-        share = values[before] / (values[before] - values[before + 1])
-        at, there = (each[before] + share * np.diff(each)[before] for each in (frequencies, others))
-        found = [*zip(at.tolist(), there.tolist(), strict=True), *ends]
-        return sorted(found, key=lambda pair: abs(pair[1])) or [(None, None)]
+    log_gain = np.log(np.abs(loop))
+    follows = np.abs(loop / returned)
 
     # At half the sample rate, where the curve ends, the loop is real.
     lags = np.where(loop.real < 0.0, loop.imag, np.nan)
     lags[-1] = np.nan
     end = [(float(frequencies[-1]), float(log_gain[-1]))] if loop[-1].real < 0.0 else []
-    phase_crossover, log_margin = crossings(lags, log_gain, *end)[0]
-    gain_crossover, phase_margin = crossings(log_gain, np.angle(-loop))[0]
+    phase_crossover, log_margin = _crossings(frequencies, lags, log_gain, *end)[0]
+    gain_crossover, phase_margin = _crossings(frequencies, log_gain, np.angle(-loop))[0]
     return LoopMargins(
         is_stable=bool(np.max(np.abs(closed)) < 1.0 + _INTEGRATOR * period),
         gain_margin=None if log_margin is None else float(np.exp(-log_margin)),
         phase_crossover=phase_crossover,
         phase_margin=phase_margin,
         gain_crossover=gain_crossover,
-        bandwidth=crossings(follows - np.sqrt(0.5) * follows[0], frequencies)[0][0],
+        bandwidth=_crossings(frequencies, follows - np.sqrt(0.5) * follows[0], frequencies)[0][0],
         peak_sensitivity=float(np.max(1.0 / np.abs(returned))),
         frequencies=frequencies,
         loop=loop,
     )
+
+
+def _crossings(
+    frequencies: Floats, values: Floats, others: Floats, *ends: tuple[float, float]
+) -> list[tuple[Any, Any]]:
+    """Frequencies [Hz] at which ``values`` change sign, with the value of ``others`` there, the ones nearest 0 first.
+
+    ``ends`` are further pairs of a frequency and a value; (None, None) where there is no crossing.
+    """
+    before = np.flatnonzero(values[:-1] * values[1:] < 0.0)
+    share = values[before] / (values[before] - values[before + 1])
+    at, there = (each[before] + share * np.diff(each)[before] for each in (frequencies, others))
+    pairs = [*zip(at.tolist(), there.tolist(), strict=True), *ends]
+    return sorted(pairs, key=lambda pair: abs(pair[1])) or [(None, None)]
 
 
 # Report: operating point, side of each limit, poles, margins, matrices and range of validity.
@@ -733,7 +763,8 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
                 f"{name} is {100.0 * share:.4g} % of its supply pressure, at the limit of the actuator: hardly any "
                 "flow into the chamber is left, and gains and margins hold for very small changes only"
             )
-    point, poles = [], []
+    point = []
+    poles = []
     outputs = tuple(name for name in model.outputs if name not in model.states)
     for role, names in (("state", model.states), ("input", model.inputs), ("output", outputs)):
         for name in names:
@@ -753,7 +784,8 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
     ratio = ("damping ratio", Kind(form=".3f"))
     matrices = []
     for name in "ABCD":
-        rows, columns = model.states if name in "AB" else model.outputs, model.states if name in "AC" else model.inputs
+        rows = model.states if name in "AB" else model.outputs
+        columns = model.states if name in "AC" else model.inputs
         cells = [(row, *values) for row, values in zip(rows, getattr(model, name).tolist(), strict=True)]
         titles: list[str | tuple[str, Kind]] = ["", *((column, Kind(form=".5g")) for column in columns)]
         matrices.append(Section(f"Matrix {name} (SI)", columns_of(titles, cells)))
@@ -810,14 +842,16 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
 
 def _loop(model: LinearModel) -> Section:
     """Return the table of the margins of the loop with the scenario's PID, or the reason why there is none."""
-    margins, controller = model.margins, model.scenario.controller
+    margins = model.margins
+    controller = model.scenario.controller
     if margins is None:
         is_pid = controller.kind in PID_LAWS
         reason = (
             "the command is clipped, or has no effect" if is_pid else f"controller '{controller.kind}' is not a PID"
         )
         return Section(remarks=[f"no stability margins: {reason}"])
-    frequency, angle = Kind(quantity="frequency", form=".3g"), Kind(quantity="angle", form=".3g")
+    frequency = Kind(quantity="frequency", form=".3g")
+    angle = Kind(quantity="angle", form=".3g")
     gain = margins.gain_margin or 1.0
     rows = [("closed loop", "stable" if margins.is_stable else "unstable")]
     for name, text, at in (
@@ -836,17 +870,21 @@ def _loop(model: LinearModel) -> Section:
 
 def frequency_panels(model: LinearModel) -> list[Panel]:
     """Return panels of the open loop with its margins, if any, and of the frequency response of torque to command."""
-    poles, margins, delays = np.abs(model.poles) / (2.0 * np.pi), model.margins, model.delays
+    poles = np.abs(model.poles) / (2.0 * np.pi)
+    margins = model.margins
+    delays = model.delays
     found = () if margins is None else (margins.gain_crossover, margins.phase_crossover, margins.bandwidth)
     # All frequencies that the report names, and half the sample rate, where a loop ends.
     lowest = 0.1 * min((1.0, *poles[poles > 0.0].tolist(), *filter(None, found)))
     highest = max(100.0, 0.0 if margins is None else 0.5 / delays.period)
     frequencies = np.geomspace(lowest, highest, 400)
-    response, delay = model.response(frequencies), delays.command + delays.signals + 0.5 * delays.period
+    response = model.response(frequencies)
+    delay = delays.command + delays.signals + 0.5 * delays.period
 
     def panel(kind: Kind, marks: list[Mark], **scales: Any) -> Panel:
         limits = {"xscale": "log", "xlim": (lowest, 1.1 * highest), **scales}
-        frequency, then = Kind("Frequency", "Hz"), methodcaller("set", **limits)
+        frequency = Kind("Frequency", "Hz")
+        then = methodcaller("set", **limits)
         return Panel(frequency, kind, marks, then=then, shares_x=True)
 
     panels = []
@@ -867,7 +905,8 @@ def frequency_panels(model: LinearModel) -> list[Panel]:
                 (margins.phase_crossover, "gain margin", BLACK, "s"),
             ):
                 if crossover is not None:
-                    place, label = np.array([crossover]), f"{name} at {crossover:.3g} Hz"
+                    place = np.array([crossover])
+                    label = f"{name} at {crossover:.3g} Hz"
                     marks.append(dots(place, np.interp(place, at, curve), marker, label, colour, markersize=5))
             panels.append(panel(kind, marks, yscale=scale))
     phase = np.degrees(np.unwrap(np.angle(response)))
@@ -894,7 +933,8 @@ def steps_of(model: LinearModel, shares: tuple[float, ...] = _SHARES) -> tuple[F
     """
     from scipy.signal import StateSpace, step
 
-    command, run = model.values["command"], model.scenario.run
+    command = model.values["command"]
+    run = model.scenario.run
     held = replace(
         model.scenario,
         run=replace(run, duration=1.0, step=_INTERVAL, output_interval=_INTERVAL),

@@ -92,7 +92,8 @@ class Claim:
     @property
     def limits(self) -> tuple[float, float]:
         """Range in which the claim holds, in its unit; a side that the file leaves open is infinite."""
-        low, high = self.entry.at_least, self.entry.at_most
+        low = self.entry.at_least
+        high = self.entry.at_most
         return -math.inf if low is None else low, math.inf if high is None else high
 
     @property
@@ -204,12 +205,14 @@ def load_publication(name_or_path: str | Path) -> tuple[Claim, ...]:
             # Only for what it raises: here the place in the file is known.
             from_si(1.0, entry.unit, unit)
         if entry.arguments.keys() != takes.keys():
-            given, known = ", ".join(entry.arguments) or "none", ", ".join(takes) or "none"
+            given = ", ".join(entry.arguments) or "none"
+            known = ", ".join(takes) or "none"
             hints = "".join(nearest_name(name, takes) for name in entry.arguments if name not in takes)
             raise ScenarioError(f"{where}.arguments: {entry.computation} takes {known}; given: {given}{hints}")
         values = {}
         for name, unit in takes.items():
-            key, text = f"{where}.arguments.{name}", entry.arguments[name]
+            key = f"{where}.arguments.{name}"
+            text = entry.arguments[name]
             with refused_as(ScenarioError, key, UnitError):
                 values[name] = parse_quantity(text, unit)
             # An absolute pressure does not lie below 0.
@@ -252,7 +255,8 @@ def walking_torque(pressure: float) -> float:
 def dorsiflexor_share() -> float:
     """Dorsiflexor moment of a nondisabled wearer with the device divided by the moment without [-], stride means."""
     # The muscles of a nondisabled wearer keep the measured ankle angle.
-    worn, name = _walked("wearer.keeps_gait=1"), "dorsiflexor_moment"
+    worn = _walked("wearer.keeps_gait=1")
+    name = "dorsiflexor_moment"
     return worn.metrics[name].value / healthy_metrics(worn.scenario)[name].value
 
 

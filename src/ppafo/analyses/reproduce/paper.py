@@ -166,7 +166,8 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
     ``report`` receives the progress. Raises ScenarioError for a path that no experiment has, SimulationError if a run
     fails.
     """
-    scenarios, runs = _scenarios(overrides), []
+    scenarios = _scenarios(overrides)
+    runs = []
     for name, scenario in scenarios.items():
         report(Progress(f"simulating {name}"))
         runs.append(simulate(scenario))
@@ -263,7 +264,8 @@ def _assumed_in(scenario: Scenario) -> Iterator[AssumedValue]:
     """Yield the assumed values of a scenario: those that it states, then those of its parameter set in force."""
     origin = scenario.origin
     assert origin.parameters is not None, "read from a file"
-    changed, in_force = override_document(request_again(origin)), with_followers(origin.parameters)
+    changed = override_document(request_again(origin))
+    in_force = with_followers(origin.parameters)
     written = read_overrides(origin.content["device"].get("overrides", ()))
     file_set = with_overrides(load_parameter_set(origin.parameter_set), written, origin.valve)
     declared = {**quantities(changed.document), **in_force.declarations()}
@@ -291,7 +293,8 @@ def _bench_figure() -> tuple[BenchResult, BenchResult]:
     Raises SimulationError if a run of the rig fails.
     """
     # Kept: it takes seconds, and no override reaches it.
-    planted, inertia = load_parameter_set(PLANTED_SET), "foot_plate.inertia"
+    planted = load_parameter_set(PLANTED_SET)
+    inertia = "foot_plate.inertia"
     # The inertia is exact, and nothing is known of the friction.
     known = replace(planted, numbers={inertia: planted.numbers[inertia]})
     context = BenchContext(known, "", "figure 3", Tolerances(held=0.0))
@@ -308,7 +311,8 @@ def _bench_figure() -> tuple[BenchResult, BenchResult]:
 
 def arithmetic_claims(reported: ParameterSet) -> list[Claim]:
     """Return the claims that the paper's numbers alone decide: what the audit of its set finds, and percentages."""
-    entries, evidence = paper_entries(), Evidence(reported)
+    entries = paper_entries()
+    evidence = Evidence(reported)
     found = {finding.id: finding for finding in findings_of(reported)}
     claims = []
     tested = {}
@@ -317,7 +321,8 @@ def arithmetic_claims(reported: ParameterSet) -> list[Claim]:
         ours = [(finding.sides[side], finding.values[value].path) for finding in findings]
         numbers = [evidence.in_set_unit(path, own.value) if own.unit else f"{own.value:.4g}" for own, path in ours]
         tested[identifier] = all(finding.severity == "note" for finding in findings), numbers
-    holds, percentages = True, []
+    holds = True
+    percentages = []
     for name, full in _STEP_RANGES.items():
         error, percent = (entries[f"step_{kind}_{name}"].published or 0.0 for kind in ("rms", "percent"))
         # Both numbers are rounded: their ranges have to meet.
@@ -382,16 +387,20 @@ def step_observations(recording: Recording, supply: Supply) -> list[Claim]:
     vane moves, then approaches the supply pressure; pressure 2 falls, more slowly while chamber 2 is compressed, then
     approaches the atmosphere. No statement holds if the vane does not move.
     """
-    entries, events = paper_entries(), step_events(recording)
+    entries = paper_entries()
+    events = step_events(recording)
     if events is None:
         statements = (name for name, entry in entries.items() if entry.computation == "figure_7")
         return [_observed(name, False, "the vane does not move from rest to rest") for name in statements]
     (start, stop), observed = events, list[Claim]()
     # Gauge pressures [psi], and times [ms].
-    time, angle, atmosphere = 1e3 * recording.time, np.degrees(recording["angle"]), supply.atmospheric_pressure
+    time = 1e3 * recording.time
+    angle = np.degrees(recording["angle"])
+    atmosphere = supply.atmospheric_pressure
     first, second = ((recording[f"pressure_{chamber}"] - atmosphere) / PASCALS_PER_PSI for chamber in (1, 2))
     top = (supply.pressure - atmosphere) / PASCALS_PER_PSI
-    clear, same = _CLEAR * top, _SAME * top
+    clear = _CLEAR * top
+    same = _SAME * top
 
     def only_rises(pressure: Floats) -> bool:
         return bool(pressure[-1] > pressure[0] and np.max(np.maximum.accumulate(pressure) - pressure) < same)
@@ -419,7 +428,8 @@ def step_observations(recording: Recording, supply: Supply) -> list[Claim]:
     gone = np.abs(angle - angle[0]) > _SETS_OFF * np.abs(angle[-1] - angle[0])
     peak = int(np.argmax(first[: int(np.argmax(gone)) + 1]))
     lowest = peak + int(np.argmin(first[peak : stop + 1]))
-    further, again = first[peak] - first[start], first[stop] - first[lowest]
+    further = first[peak] - first[start]
+    again = first[stop] - first[lowest]
     rises_on = f"after breakaway it still rises for {time[peak] - time[start]:.0f} ms, by {further:.1f} psi"
     rises_again = f"it rises again by {again:.1f} psi before the stop"
     beyond = (text for rise, text in ((further, rises_on), (again, rises_again)) if rise >= same)
@@ -435,25 +445,40 @@ def step_observations(recording: Recording, supply: Supply) -> list[Claim]:
     evidence = f"from {second[0]:.1f} to {second[start]:.1f} psig until breakaway"
     observed.append(_observed("pressure_2_falls_from_supply", falls, evidence))
 
-    # Gas that only vents would fall at an ever slower rate; gas that is strongly compressed would rise. The rate is of
-    # falling [psi/ms], so that a rise is negative and slower than any fall.
-    rate, moving = -np.diff(second) / np.diff(time), second[start : stop + 1]
-    slowest = start + int(np.argmin(rate[start:stop]))
-    fast, least, later = np.max(rate[: slowest + 1]), rate[slowest], np.max(rate[slowest:])
-    rise = np.max(moving - np.minimum.accumulate(moving))
-    slows = least <= _SLOWED * min(fast, later) and rise <= (entries["pressure_2_slows_in_motion"].at_most or 0.0)
-    evidence = f"falls by {fast:.2f} psi/ms at first, {'rises' if least < 0.0 else 'falls'} by {abs(least):.2f} psi/ms "
-    evidence += f"at {time[slowest]:.0f} ms, falls by up to {later:.1f} psi/ms later"
-    instead = f"instead of only falling more slowly it rises by {rise:.1f} psi" if rise >= same else ""
-    observed.append(_observed("pressure_2_slows_in_motion", slows, evidence, instead))
+    observed.append(_slowing_of_second(second, time, start, stop, same))
 
-    empties, evidence = abs(second[-1]) < same, f"{second[-1]:.2f} psig at the end"
+    empties = abs(second[-1]) < same
+    evidence = f"{second[-1]:.2f} psig at the end"
     observed.append(_observed("pressure_2_goes_to_atmosphere", empties, evidence))
 
     # From full pressure one way to full pressure the other way: the range twice.
-    begins, ended = first[0] - second[0], first[-1] - second[-1]
-    builds_up, evidence = abs(ended - begins - 2.0 * top) < 2.0 * same, f"from {begins:.1f} to {ended:.1f} psi"
+    begins = first[0] - second[0]
+    ended = first[-1] - second[-1]
+    builds_up = abs(ended - begins - 2.0 * top) < 2.0 * same
+    evidence = f"from {begins:.1f} to {ended:.1f} psi"
     return [*observed, _observed("difference_builds_up", builds_up, evidence)]
+
+
+def _slowing_of_second(second: Floats, time: Floats, start: int, stop: int, same: float) -> Claim:
+    """Verdict on the fall of pressure 2 [psi] over times [ms], slower while the vane moves from ``start`` to ``stop``.
+
+    ``same`` is the difference of pressures that counts as none [psi].
+    """
+    # Gas that only vents would fall at an ever slower rate; gas that is strongly compressed would rise. The rate is of
+    # falling [psi/ms], so that a rise is negative and slower than any fall.
+    rate = -np.diff(second) / np.diff(time)
+    moving = second[start : stop + 1]
+    slowest = start + int(np.argmin(rate[start:stop]))
+    fast = np.max(rate[: slowest + 1])
+    least = rate[slowest]
+    later = np.max(rate[slowest:])
+    rise = np.max(moving - np.minimum.accumulate(moving))
+    most = paper_entries()["pressure_2_slows_in_motion"].at_most or 0.0
+    slows = least <= _SLOWED * min(fast, later) and rise <= most
+    evidence = f"falls by {fast:.2f} psi/ms at first, {'rises' if least < 0.0 else 'falls'} by {abs(least):.2f} psi/ms "
+    evidence += f"at {time[slowest]:.0f} ms, falls by up to {later:.1f} psi/ms later"
+    instead = f"instead of only falling more slowly it rises by {rise:.1f} psi" if rise >= same else ""
+    return _observed("pressure_2_slows_in_motion", slows, evidence, instead)
 
 
 def torque_task_observations(solenoid: Result, proportional: Result) -> list[Claim]:
@@ -463,7 +488,8 @@ def torque_task_observations(solenoid: Result, proportional: Result) -> list[Cla
     fewest = paper_entries()["solenoid_oscillates_on_ramp"].at_least or 0.0
     swings = f"{on_pair_ramp} that swing over 5 % of the largest reference"
     errors = [[run.metrics.get(f"rms_error_{phase}") for run in (solenoid, proportional)] for phase in ("ramp", "hold")]
-    tracks_better, evidence = False, "this reference has no ramp and hold"
+    tracks_better = False
+    evidence = "this reference has no ramp and hold"
     if len(known := [metric.value for pair in errors for metric in pair if metric]) == 4:
         # The proportional valve has the lower error on the ramp, by more than on the hold.
         tracks_better = known[0] - known[1] > max(0.0, known[2] - known[3])
@@ -495,7 +521,9 @@ def phased_runs(solenoid: Result) -> tuple[Floats, Floats]:
     Both have shape (runs,), with valve A first and then with valve B first. Run number ``PHASES``, a whole period with
     A first, is the scenario as written. If the task has no undefined phase, there is only the given run.
     """
-    scenario, reference, period = solenoid.scenario, solenoid.scenario.reference, solenoid.scenario.controller.period
+    scenario = solenoid.scenario
+    reference = solenoid.scenario.reference
+    period = solenoid.scenario.controller.period
     # Two runs are joined by their pressures, which are the whole state only of a locked vane at constant temperature
     # without lines; and a tie is only where reference and torque both begin at 0.
     has_tie = (
@@ -513,7 +541,8 @@ def phased_runs(solenoid: Result) -> tuple[Floats, Floats]:
     if not has_tie:
         gas = GRAMS_PER_KILOGRAM * solenoid.metrics["gas_supplied"].value
         return np.array([solenoid.metrics["rms_error"].value]), np.array([gas])
-    fine, duration = replace(scenario.run, step=_FINE_STEP, output_interval=_FINE_STEP), scenario.run.duration
+    fine = replace(scenario.run, step=_FINE_STEP, output_interval=_FINE_STEP)
+    duration = scenario.run.duration
     slope = reference.settings["level"] / reference.settings["ramp_time"]
     runs = []
     for tie in (_TIE, -_TIE):
@@ -560,7 +589,8 @@ def torque_task_claims(
     follows = "Follows from the two amounts of gas and is not independent evidence."
     # Where the pair makes no error, or takes no gas, there is nothing to save from.
     with np.errstate(divide="ignore", invalid="ignore"):
-        better, saved = 100.0 * (1.0 - error / pair_errors), 100.0 * (1.0 - gas / pair_gas)
+        better = 100.0 * (1.0 - error / pair_errors)
+        saved = 100.0 * (1.0 - gas / pair_gas)
     # No decimals of what varies by several percent over the phases.
     return [
         _claim_over_phases("torque_rms_improvement", better, over, rests_on),
@@ -593,10 +623,13 @@ def _control_claims(solenoid: Result, proportional: Result, pair_errors: Floats)
     Runs with the settings of each are compared with the experiments; ``pair_errors`` are the RMS errors [N m] of the
     solenoid pair over the unknown phase of its decisions.
     """
-    claims, faster, rests_on = [], "limited_by_switching", ("the torque task as completed here",)
+    claims = []
+    faster = "limited_by_switching"
+    rests_on = ("the torque task as completed here",)
     runs = {faster: solenoid, "gains_minimise_error": proportional, "dead_zone_amplifies_delay": solenoid}
     for identifier, run in runs.items():
-        entry, own = paper_entries()[identifier], run.scenario.origin.overrides
+        entry = paper_entries()[identifier]
+        own = run.scenario.origin.overrides
         # Another law takes nothing that was set for this one.
         overrides = [override for override in own if not override.startswith("controller.")]
         overrides += [f"{path}={value}" for path, value in entry.arguments.items()]
@@ -606,7 +639,8 @@ def _control_claims(solenoid: Result, proportional: Result, pair_errors: Floats)
             claims.append(Claim(entry, "undetermined", note=f"{entry.note} {failure}."))
             continue
         if identifier == faster:
-            less, words = 100.0 * (1.0 - changed / pair_errors), "% less error at 100 Hz"
+            less = 100.0 * (1.0 - changed / pair_errors)
+            words = "% less error at 100 Hz"
             claims.append(_claim_over_phases(faster, less, entry.note, rests_on, words=words))
             continue
         error = run.metrics["rms_error"].value
@@ -623,7 +657,8 @@ def readings_of_u(solenoid: Result, proportional: Result) -> tuple[Interpretatio
 
     The result is empty if another control law or reference is used.
     """
-    pair, spool = solenoid.scenario, proportional.scenario
+    pair = solenoid.scenario
+    spool = proportional.scenario
     if spool.controller.kind != "pid" or {pair.reference.kind, spool.reference.kind} != {"ramp_hold"}:
         return ()
 
@@ -632,10 +667,12 @@ def readings_of_u(solenoid: Result, proportional: Result) -> tuple[Interpretatio
         metrics, within = (simulate(run).metrics for run in (scenario, _with_reference(scenario, level=WITHIN_REACH)))
         return [metrics["rms_error"].value, metrics["gas_supplied"].value, within["rms_error"].value]
 
-    readings, against = [], both(pair)
+    readings = []
+    against = both(pair)
     for name, full in READINGS_OF_U:
         # Volts times a gain for volts give the same opening.
-        own, gains = spool.controller.settings, ("proportional_gain", "integral_gain", "derivative_gain")
+        own = spool.controller.settings
+        gains = ("proportional_gain", "integral_gain", "derivative_gain")
         settings = {**own, **{gain: own[gain] / full for gain in gains}}
         read = replace(spool, controller=replace(spool.controller, settings=settings))
         less = (100.0 * (1.0 - value / other) for value, other in zip(both(read), against, strict=True))
@@ -646,8 +683,11 @@ def readings_of_u(solenoid: Result, proportional: Result) -> tuple[Interpretatio
 def result_on_u(rows: Sequence[InterpretationOfU]) -> tuple[str, ...]:
     """Return the conclusion from the interpretations of U as a sentence; empty if the numbers do not support it."""
     entries = paper_entries()
-    error, saving = entries["torque_rms_improvement"], entries["co2_saving"]
-    low, high, least = error.at_least or 0.0, error.at_most or 0.0, saving.at_least or 0.0
+    error = entries["torque_rms_improvement"]
+    saving = entries["co2_saving"]
+    low = error.at_least or 0.0
+    high = error.at_most or 0.0
+    least = saving.at_least or 0.0
     # The first reading is the opening itself, the others are voltages.
     agrees = [low <= row.error <= high for row in rows]
     is_beyond_reach = not any(low <= row.error_within_reach <= high for row in rows)

@@ -54,13 +54,15 @@ def reproduce(
     from ppafo.parameters.publications.publication import PAPER
     from ppafo.wording import argument_text, known_names
 
-    name, changes = str(study), tuple(overrides)
+    name = str(study)
+    changes = tuple(overrides)
     if name not in study_names() and Path(study).suffix != ".toml":
         raise ScenarioError(
             f"there is no study '{label(name)}'{known_names(name, study_names())}, or give a .toml file"
         )
     if changes and name != PAPER:
-        option, argument = argument_text("overrides", option="--set"), argument_text("study")
+        option = argument_text("overrides", option="--set")
+        argument = argument_text("study")
         raise ScenarioError(f"{option} {changes[0]}: applies to the study '{PAPER}' only; omit {option} or {argument}")
     if name == PAPER:
         return finding_of(reproduce_paper(changes, report))

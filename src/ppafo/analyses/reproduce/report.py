@@ -119,7 +119,8 @@ def _row(claim: Claim) -> tuple[str, str | None, str, str]:
 
 def _agrees(claim: Claim) -> str | None:
     """Format the range of values that agrees with a claim as text."""
-    low, high = claim.entry.at_least, claim.entry.at_most
+    low = claim.entry.at_least
+    high = claim.entry.at_most
     if low is None and high is None:
         return None
     text = f"at most {high:g}" if low is None else f"at least {low:g}" if high is None else f"{low:g} to {high:g}"
@@ -132,7 +133,9 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
     The finding has not passed if a value is outside its window although no value was overridden. Figure 3 needs the
     simulated test bench.
     """
-    missed, rows, synthetic = reproduction.missed, reproduction.readings_of_u, reproduction.synthetic
+    missed = reproduction.missed
+    rows = reproduction.readings_of_u
+    synthetic = reproduction.synthetic
     said = [NOTHING_CONFIRMED]
     parts = []
     if reproduction.overrides:
@@ -146,7 +149,8 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
         head = ("U is", "RMS error less by", "CO2 less by", f"error at {paper.WITHIN_REACH:g} N m less by")
         cells = [(name, *(f"{less:.0f} %" for less in lesses)) for name, *lesses in rows]
         parts.append(Section(columns=columns_of(head, cells), remarks=("", *result_on_u(rows))))
-    step, task = partial(_step_panels, reproduction), partial(_torque_task_panels, reproduction)
+    step = partial(_step_panels, reproduction)
+    task = partial(_torque_task_panels, reproduction)
     # Its grey curves are a synthetic measurement, so that the figure is marked as synthetic.
     origin = None if isinstance(synthetic, str) else synthetic.step.kind
     parts.append(Section(name=STEP_FIGURE, panels=step, across=2, size=(3.15, 1.0), kind=origin, is_detail=True))
@@ -178,7 +182,8 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
 
     ``drawn`` are the figures as SVG by file name; they become part of the page.
     """
-    synthetic, reported = reproduction.synthetic, load_parameter_set(paper.REPORTED_SET)
+    synthetic = reproduction.synthetic
+    reported = load_parameter_set(paper.REPORTED_SET)
     runs = (reproduction.solenoid, reproduction.proportional, reproduction.step)
     completed = load_parameter_set(reproduction.step.scenario.origin.parameter_set)
     changed = [word for override in reproduction.overrides for word in ("--set", override)]
@@ -243,10 +248,12 @@ def _step_panels(reproduction: Reproduction) -> list[Panel]:
         time = _MILLISECONDS * recording.time
         marks = [Mark("line", time, model, label="model", colour=look.colour, style={"zorder": 3})]
         if synthetic is not None:
-            time, readings = _MILLISECONDS * synthetic.time, _step_curves(synthetic, atmosphere)[number]
+            time = _MILLISECONDS * synthetic.time
+            readings = _step_curves(synthetic, atmosphere)[number]
             starts = np.flatnonzero(np.diff(np.floor(time / _BIN), prepend=-np.inf) > 0.0)
             band = np.minimum.reduceat(readings, starts), np.maximum.reduceat(readings, starts)
-            thin, pale = {"linestyle": "-", "linewidth": 0.8, "zorder": 2}, {"alpha": 0.3, "zorder": 1}
+            thin = {"linestyle": "-", "linewidth": 0.8, "zorder": 2}
+            pale = {"alpha": 0.3, "zorder": 1}
             marks.append(Mark("line", time, readings, (), "synthetic measurement", style.EXPERIMENT.colour, thin))
             marks.append(Mark("band", time[starts] + 0.5 * _BIN, band, colour=style.EXPERIMENT.colour, style=pale))
             error = readings - np.interp(synthetic.time, recording.time, model)
@@ -263,14 +270,16 @@ def _step_panels(reproduction: Reproduction) -> list[Panel]:
             )
         # The first panel has the legend of all panels.
         marks += [*lines, *names] if number == 0 else lines
-        legend, enlarged = "" if number else "figure", partial(_enlarge, inset, limits)
+        legend = "" if number else "figure"
+        enlarged = partial(_enlarge, inset, limits)
         signals.append(Panel(_AFTER_STEP, kind, marks, title, None, legend, enlarged, tall=2.3, shares_x=True))
     return [*signals[:2], *errors[:2], *signals[2:], *errors[2:]]
 
 
 def _step_curves(recording: Recording, atmosphere: float) -> tuple[Floats, ...]:
     """Return the values (samples,) of the panels of figure 7, in the order and units of ``_STEP_PANELS``."""
-    first, second = recording["pressure_1"], recording["pressure_2"]
+    first = recording["pressure_1"]
+    second = recording["pressure_2"]
     gauge = ((pressure - atmosphere) / PASCALS_PER_PSI for pressure in (first, second))
     return (np.degrees(recording["angle"]), (first - second) / PASCALS_PER_PSI, *gauge)
 
@@ -305,7 +314,8 @@ def _torque_task_panels(reproduction: Reproduction) -> list[Panel]:
     runs = {valve: getattr(reproduction, valve).recording for valve in valves}
     stated = {claim.entry.id: claim.entry.published or 0.0 for claim in reproduction.claims}
     in_paper = {valve: stated[f"co2_{valve}"] for valve in valves}
-    ceiling, dashed = holding_torque(reproduction.solenoid), {"linestyle": style.REFERENCE.line, "linewidth": 1.3}
+    ceiling = holding_torque(reproduction.solenoid)
+    dashed = {"linestyle": style.REFERENCE.line, "linewidth": 1.3}
 
     def bar(ends: tuple[float, float], middle: float, half: float, colour: str, alpha: float, label: str = "") -> Mark:
         edges = (middle - half,) * 2, (middle + half,) * 2
@@ -352,7 +362,8 @@ def _torque_task_panels(reproduction: Reproduction) -> list[Panel]:
     limits = partial(methodcaller, "set", xlim=(float(solenoid.time[0]), float(solenoid.time[-1])))
     # All torque panels have the same limits, 5 % beyond their marks.
     drawn = [mark.y for marks in torques for mark in marks]
-    low, high = min(float(np.min(values)) for values in drawn), max(float(np.max(values)) for values in drawn)
+    low = min(float(np.min(values)) for values in drawn)
+    high = max(float(np.max(values)) for values in drawn)
     torque_limits = limits(ylim=(low - 0.05 * (high - low), high + 0.05 * (high - low)))
     chambers = limits(ylim=(0.0, 2.0), yticks=(0.5, 1.5), yticklabels=("2", "1"))
     opening = Mark("line", proportional.time, proportional["command"], colour=style.PROPORTIONAL.colour)

@@ -26,7 +26,8 @@ _COLUMNS = ("path", "value", "unit", "origin", "source")
 
 def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
     """Return every value of a set with its source as a finding with one table."""
-    stated, parameter_set = parameter_set.citation, with_followers(parameter_set)
+    stated = parameter_set.citation
+    parameter_set = with_followers(parameter_set)
     # By section only, so that within a section texts come first and numbers as they are declared.
     entries = sorted(parameter_set.entries().items(), key=lambda entry: _SECTIONS.index(entry[0].partition(".")[0]))
     document: dict[str, Any] = {
@@ -42,7 +43,8 @@ def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
     cited = ""
     if stated is not None:
         authors = f"{', '.join(stated.authors)}: " if stated.authors else ""
-        year, doi = f" ({stated.year})" if stated.year else "", f" doi:{stated.doi}" if stated.doi else ""
+        year = f" ({stated.year})" if stated.year else ""
+        doi = f" doi:{stated.doi}" if stated.doi else ""
         cited = f"{authors}{stated.title}{year}.{doi} {stated.note}".strip()
     rows = []
     remarks = []
@@ -158,7 +160,8 @@ def audited(
         with refused_as(ParameterError, place, ParameterError):
             parent_set = set_or_load(loaded.parent or None if parent is None else parent)
         sets.append(AuditedSet(loaded, parent_set, tuple(findings_of(loaded, parent_set)), tuple(overrides)))
-    first, is_single = sets[0], len(sets) == 1
+    first = sets[0]
+    is_single = len(sets) == 1
     if is_single:
         compares = first.parent is not None or bool(first.overrides)
         changed = changed_paths(first.parameter_set, first.parent) if compares and not is_whole else None
@@ -191,14 +194,18 @@ def _parts(audited_set: AuditedSet, changed: frozenset[str] | None) -> list[Sect
 
     The findings are errors and findings on ``changed`` paths; all findings if ``changed`` is None.
     """
-    name, parent, findings = audited_set.parameter_set.name, audited_set.parent, audited_set.findings
+    name = audited_set.parameter_set.name
+    parent = audited_set.parent
+    findings = audited_set.findings
     parts = []
     if parent is not None:
         rows = [
             (change.path, change.before or None, change.after or None, change.origin)
             for change in changes(audited_set.parameter_set, parent)
         ]
-        own, others, changed_values = audited_set.parameter_set.entries(), parent.entries(), {row[0] for row in rows}
+        own = audited_set.parameter_set.entries()
+        others = parent.entries()
+        changed_values = {row[0] for row in rows}
         restated = sum(
             (entry.origin, entry.source) != (others[path].origin, others[path].source)
             for path, entry in own.items()

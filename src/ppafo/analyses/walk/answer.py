@@ -99,10 +99,13 @@ def finding_of(comparison: WalkComparison) -> ask.Finding[dict[str, Any]]:
     A walk that diverged has numbers but no figures, and the report has not passed.
     """
     worn = comparison.with_device
-    scenario, motion, law = worn.scenario, walk_of(worn.scenario), law_of(worn.scenario)
+    scenario = worn.scenario
+    motion = walk_of(worn.scenario)
+    law = law_of(worn.scenario)
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
     ended = f"{scenario.name}: {worn.status.kind}, {strides} of {motion.gait.name}"
-    verdict, gains = ask.verdict_of(worn), ask.gains_of(scenario)
+    verdict = ask.verdict_of(worn)
+    gains = ask.gains_of(scenario)
     cut_off = (walked for walked in (worn, comparison.without_device) if not walked.status.is_completed)
     said = [ended, *(f"{walked.scenario.name}: {walked.status.message}" for walked in cut_off)]
     said += [benefit_sentence(comparison), verdict.sentence, limited_request(scenario)]
@@ -184,16 +187,15 @@ def benefit_sentence(comparison: WalkComparison) -> str:
 
     The device helps by net work in push-off, toes above the ground, and an ankle closer to the healthy angle.
     """
-    worn, bare = comparison.with_device, comparison.without_device
+    worn = comparison.with_device
+    bare = comparison.without_device
     numbers, without = ({name: metric.value for name, metric in walked.metrics.items()} for walked in (worn, bare))
     if "diverged" in (worn.status.kind, bare.status.kind) or "net_push_off_work" not in numbers:
         return ""
     has_work = numbers["net_push_off_work"] > 0.0
     drags, drags_without = (metrics.get("lowest_toes", 0.0) < 0.0 for metrics in (numbers, without))
-    clauses, lifts = (
-        [f"{_WORK.text(numbers['net_push_off_work'])} of net work in push-off"],
-        drags_without and not drags,
-    )
+    clauses = [f"{_WORK.text(numbers['net_push_off_work'])} of net work in push-off"]
+    lifts = drags_without and not drags
     if "push_off_share" in numbers:
         clauses[0] += f" (positive work {_PERCENT.text(numbers['push_off_share'])} of the healthy ankle's)"
     if "angle_difference" in numbers and "angle_difference" in without:
@@ -249,8 +251,11 @@ def _trials(worn: WalkResult, drags: bool) -> tuple[str, Sequence[tuple[str, ...
     ``drags`` is True if the toes would drag. Where the controller requests less torque at the lowest toes than the
     actuator gives, a stiffer hold is tried; a limit that cuts the request is raised to the torque of the actuator.
     """
-    scenario, requested, available = worn.scenario, 0.0, 0.0
-    settings, supply = scenario.controller.settings, scenario.device.supply
+    scenario = worn.scenario
+    requested = 0.0
+    available = 0.0
+    settings = scenario.controller.settings
+    supply = scenario.device.supply
     levels = {"supply.pressure": supply.pressure}
     if supply.dorsiflexion_pressure != supply.pressure:
         levels["supply.dorsiflexion_pressure"] = supply.dorsiflexion_pressure
@@ -262,7 +267,8 @@ def _trials(worn: WalkResult, drags: bool) -> tuple[str, Sequence[tuple[str, ...
     ]
     if scenario.controller.kind == "off":
         # A controller alone, and with the valve that it needs.
-        law, valve = "controller.kind=event_proportional", "device.valve=proportional"
+        law = "controller.kind=event_proportional"
+        valve = "device.valve=proportional"
         return "its controller is off", ((law,), (law, valve)), "another controller alone does not help"
     if drags and "reference" in worn.averages:
         # Dorsiflexion torques at the lowest toes: requested, and of the actuator.
@@ -270,8 +276,10 @@ def _trials(worn: WalkResult, drags: bool) -> tuple[str, Sequence[tuple[str, ...
         first, last = PHASES.searchsorted([timing.clearance_from, timing.clearance_to])
         lowest = first + int(worn.averages["toe_height"].mean[first:last].argmin())
         request, angle = (float(worn.averages[name].mean[lowest]) for name in ("reference", "angle"))
-        requested, available = -request, -torque_reach(scenario.device, angle)[0]
-    path, other = "controller.hold_stiffness", "an actuator with more torque" if drags else "another timing of push-off"
+        requested = -request
+        available = -torque_reach(scenario.device, angle)[0]
+    path = "controller.hold_stiffness"
+    other = "an actuator with more torque" if drags else "another timing of push-off"
     if requested >= _NEARLY * available or "hold_stiffness" not in settings:
         return (
             "the ankle is not lifted enough" if drags else "the torque opposes the motion",
@@ -301,8 +309,13 @@ def _walk_data(comparison: WalkComparison, verdict: ask.Tracking) -> dict[str, A
     ``verdict`` is on the torque that the controller requests. A bottle is described by its values, without the gas
     property tables; at its end, and at their lowest, are its series.
     """
-    worn, bare, scenario = comparison.with_device, comparison.without_device, comparison.with_device.scenario
-    motion, control, origin, supply = walk_of(scenario), scenario.controller, scenario.origin, worn.supply
+    worn = comparison.with_device
+    bare = comparison.without_device
+    scenario = comparison.with_device.scenario
+    motion = walk_of(scenario)
+    control = scenario.controller
+    origin = scenario.origin
+    supply = worn.supply
     of_supply = (
         {}
         if supply is None
@@ -354,7 +367,9 @@ def _walk_data(comparison: WalkComparison, verdict: ask.Tracking) -> dict[str, A
 
 def _bottle_facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
     """Return end of the walk and its time, gas used, and lowest temperatures, as pairs of name and value."""
-    values, motion, peaks = supply.values, walk_of(worn.scenario), worn.peak_torques
+    values = supply.values
+    motion = walk_of(worn.scenario)
+    peaks = worn.peak_torques
     end = {name: float(series[-1]) for name, series in values.items()}
     filled = f"{_GAS.text(supply.supply.mass)} at {_WARMTH.text(supply.supply.temperature)}"
     remaining = _GAS.text(end["bottle_mass"])
@@ -378,7 +393,8 @@ def _bottle_facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str
     ]
     # The third stride is the first in which the controller knows the stride time.
     if peaks.size > 3:
-        third, last = _TORQUE.text(float(peaks[2])), _TORQUE.text(float(peaks[-1]))
+        third = _TORQUE.text(float(peaks[2]))
+        last = _TORQUE.text(float(peaks[-1]))
         rows.append(("push-off peak by stride", f"{third} in the third, {last} in the last"))
     return rows
 

@@ -58,7 +58,8 @@ def library_of(scenario: Scenario) -> Library:
     Raises ProgramError for a controller that is a Python object or in fixed point, and ScenarioError for a walk that
     cannot be exported.
     """
-    is_walk, kind = scenario.motion.motion_kind.layout == WALK, scenario.controller.kind
+    is_walk = scenario.motion.motion_kind.layout == WALK
+    kind = scenario.controller.kind
     if scenario.controller.is_outside:
         raise ProgramError(
             f"{scenario.name}: a controller that is a Python object cannot be exported; export the plant only "
@@ -75,14 +76,16 @@ def library_of(scenario: Scenario) -> Library:
 
         of_walk.check_can_be_exported(scenario)
     exporting = exported(batch_of(plan_run(scenario)).program)
-    program, device = exporting.program, scenario.device
+    program = exporting.program
+    device = scenario.device
     settings = settings_of(scenario, record_interval(scenario.run.duration) if is_walk else None)
     places = {setting.path: float(place) for place, setting in enumerate(settings, 1)}
     # Numbers that were changed since the scenario was loaded follow nothing any more.
     links = dict(holding(scenario.graph, Asked(partial(numbers_at, scenario))))
     links |= of_walk.LINKS_OF_WALK if is_walk else links_of_times(time_texts(scenario))
     links = {path: follows for path, follows in links.items() if path in places}
-    preparation, plant = Preparation(scenario, program, places), "prepared->parameters.plant"
+    preparation = Preparation(scenario, program, places)
+    plant = "prepared->parameters.plant"
     # Gas is drawn where the program feeds it, or the reverse.
     pressures = f"{plant}.supply_pressure", f"{plant}.dorsiflexion_pressure"
     below = " || ".join(f"{pressure} < {plant}.atmospheric_pressure" for pressure in pressures)
@@ -91,12 +94,15 @@ def library_of(scenario: Scenario) -> Library:
     checks: Sequence[PlainFunction] = PROFILE_RULES
     of_sensors: list[Switch]
     if is_walk:
-        preparing, checks, relations = of_walk.WALK_PREPARATION, WALK_RULES, of_walk.RELATIONS_OF_WALK
+        preparing = of_walk.WALK_PREPARATION
+        checks = WALK_RULES
+        relations = of_walk.RELATIONS_OF_WALK
         rules = of_walk.rules_of_walk(scenario, settings)
         of_sensors = [((*_FLAWS, *_FLAWS_OF_WALK), not program.ideal_sensors)]
         defaults = [path for path in links if not path.startswith("supply.")]
     else:
-        relations, rules = relations_of_vane(scenario), RULES_OF_TIMES
+        relations = relations_of_vane(scenario)
+        rules = RULES_OF_TIMES
         of_sensors = [
             (("sensors_delay",), program.late_signals),
             (_FLAWS, not program.ideal_sensors),
@@ -108,7 +114,8 @@ def library_of(scenario: Scenario) -> Library:
         ]
         defaults = [setting.path for setting in settings if setting.path in links and setting.quantity.follows]
         # Samples begin or cease to lie between steps; a changed time is the one to report.
-        interval, values = "prepared->counts.interval", {setting.name: setting.value for setting in settings}
+        interval = "prepared->counts.interval"
+        values = {setting.name: setting.value for setting in settings}
         moved = f"({interval} != (double)(int64_t){interval}) != {'true' if program.samples_inside else 'false'}"
         changed = [(f"{moved} && settings->{name} != {values[name]!r}", name) for name in _TIMES]
         other_program = [*changed, (moved, _TIMES[0]), *other_program]

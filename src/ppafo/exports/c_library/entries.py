@@ -112,18 +112,21 @@ def follow_entry(
 
     ``links`` are those of the scenario that hold, and of its times.
     """
-    scenario, values = preparation.scenario, {setting.path: setting.value for setting in settings}
+    scenario = preparation.scenario
+    values = {setting.path: setting.value for setting in settings}
     cells = cells_of(scenario, settings)
     lines = list[str]()
     of_loop = [link for follows in links.values() for link in follows if isinstance(link, LoopLink)]
     for path, follows in links.items():
         if of_loop and follows[0] is of_loop[0]:
             # All that defaults of the device have in common, before the first of them.
-            parts, groups = of_loop[0].parts, [name for link in of_loop for name in link.groups]
+            parts = of_loop[0].parts
+            groups = [name for link in of_loop for name in link.groups]
             functions = parts.functions(groups, partial(number_at, scenario))
             joined = StepText(preparation.program, collector).joined(functions, parts, ["settings"])
             lines += map(partial(_written, cells=cells), joined)
-        name, own = c_identifier(path), cells[path]
+        name = c_identifier(path)
+        own = cells[path]
         text = own
         # The first link that holds wins, so it is the outermost choice.
         for link in reversed(follows):

@@ -105,13 +105,16 @@ def library_files(library: Library) -> dict[str, bytes]:
 
 def _words(library: Library, name: str) -> dict[str, str]:
     """Template variables of an exported library; its own entries override the defaults."""
-    settings, program, api = library.settings, library.program, library.api
+    settings = library.settings
+    program = library.program
+    api = library.api
     outputs = ("time", *program.outputs)
     # The last argument of the loop of a run in C, where it has both kinds of steps.
     in_parts = ", run->needs_parts" if program.program.chooses_parts else ""
     steps = {"name": name, "signal_rows": str(SIGNAL_ROWS), "in_parts": in_parts}
     relations = [*(relation.condition for relation in library.relations), *library.rules]
-    table, fields = [], []
+    table = []
+    fields = []
     for setting in settings:
         quantity = setting.quantity
         low, high = limits_in_c(quantity)
@@ -202,7 +205,8 @@ def _members(items: Iterable[tuple[str, str, str]]) -> str:
 
 def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
     """Return README texts on a scenario or a walk; ``links`` has the parameters that follow others."""
-    kind, device = scenario.motion.motion_kind, scenario.device
+    kind = scenario.motion.motion_kind
+    device = scenario.device
     laws = f"the valve, `{device.valve.kind}`, and the controller, `{scenario.controller.kind}`"
     zero = [f"`valve_{name}`" for name in choosing(device) if not device.valve.settings[name] > 0.0]
     flawless = [] if any(kind.flaws(scenario)) else ["the sensor errors of `sensors_`"]

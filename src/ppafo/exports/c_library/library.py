@@ -54,7 +54,8 @@ class Relation:
     @property
     def condition(self) -> tuple[str, str]:
         """C condition, and the setting to report if it is not met."""
-        other, sign = f"settings->{c_identifier(self.other)}", "-" if self.relation == "at least" else "+"
+        other = f"settings->{c_identifier(self.other)}"
+        sign = "-" if self.relation == "at least" else "+"
         if self.tolerance:
             # With the tolerance of files, or a setting that a file accepts would be refused in C.
             slack = repr(self.tolerance)

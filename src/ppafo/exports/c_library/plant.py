@@ -107,7 +107,8 @@ def plant_of(scenario: Scenario) -> PlantAlone:
     outputs = tuple(name for name in library.program.outputs if name not in input_names | references)
     # Metrics need a whole run, which only the caller sees.
     # Where a locked joint may take its steps whole, this one does as long as it stands still.
-    is_turned, program = "angle" in input_names, library.program.program
+    is_turned = "angle" in input_names
+    program = library.program.program
     rests_whole = is_turned and program.feed is None and not (program.actuator.gives or program.valve.regulates)
     program = replace(program, meters=(), traced=outputs, rests_whole=rests_whole)
     beginnings = (*_REPLACED, _PATH) if is_turned else _REPLACED
@@ -131,7 +132,8 @@ def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, ExportParamete
     """Return the drive of a prescribed joint: inputs angle and rate if locked, no input if on a path."""
     if motion.locked_angle is None:
         return _Drive(motion="The ankle follows the prescribed motion of the scenario.")
-    stop_1, stop_2 = settings["actuator.angle_min"].value, settings["actuator.angle_max"].value
+    stop_1 = settings["actuator.angle_min"].value
+    stop_2 = settings["actuator.angle_max"].value
     # So fast that the short ramp of the first angle still ends within what a level may be.
     fastest = (settings["motion.profile.level"].quantity.maximum - max(abs(stop_1), abs(stop_2))) / _FIRST_RAMP
     start = motion.locked_angle
@@ -163,10 +165,14 @@ def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, ExportParamete
 @_drive_of.register
 def _torque_drive(motion: FreeMotion, settings: Mapping[str, ExportParameter]) -> _Drive:
     """Return the drive of a free joint: T_ex on a vane without leg, or T_2, opposed to T_ex, on the ankle of a leg."""
-    name, summary, load = "external_torque", "T_ex, above 0 against plantarflexion", ""
+    name = "external_torque"
+    summary = "T_ex, above 0 against plantarflexion"
+    load = ""
     start = motion.external_torque
     if motion.leg is not None:
-        name, summary, load = "ankle_torque", "T_2, above 0 towards plantarflexion", "-"
+        name = "ankle_torque"
+        summary = "T_2, above 0 towards plantarflexion"
+        load = "-"
         start = motion.leg.ankle_torque
     limits = settings[f"motion.{name}"].quantity
     torque = Input(name, "N m", f"torque on the ankle, {summary}", start, limits.minimum, limits.maximum)

@@ -114,7 +114,9 @@ def c_text_of_run(library: Library, title: str, around: str) -> str:
         INLINE,
         lambda function, tree: ast.fix_missing_locations(_ForOneRun(function.__globals__).visit(tree)),
     )
-    exported, program, name = library.program, library.program.program, library.name
+    exported = library.program
+    program = library.program.program
+    name = library.name
     link_program(program, collector.replacements)
     entries = [metrics_entry(exported, collector)] if exported.metrics else []
     entries += [add(collector) for add in (library.further, library.following, library.checking) if add is not None]
@@ -143,7 +145,8 @@ def c_text_of_run(library: Library, title: str, around: str) -> str:
     # Functions of the step that divide it have their ending beside those that do not.
     ending = _ENDINGS[IN_PARTS]
     own |= {name: f"{word.removesuffix(ending)}{ending}" for name, word in own.items() if name.endswith(ending)}
-    counts, taken = Counter(own.values()), _names_around()
+    counts = Counter(own.values())
+    taken = _names_around()
     short = {name: word for name, word in own.items() if counts[word] == 1 and word not in taken and is_free(word)}
     return c_source(
         # Functions of the C library have last bits of their own: a run must not call any.
@@ -197,7 +200,8 @@ _FUNCTION = re.compile(r"^(?:static )?[\w ]+\b\*?(\w+)\(", re.MULTILINE)
 
 def metrics_entry(exported: ExportedProgram, collector: SourceCollector) -> str:
     """Return the source of the entry ``metrics``: metrics of a run from its final states."""
-    program, groups = exported.program, exported.program.state_rows()
+    program = exported.program
+    groups = exported.program.state_rows()
     names = [kind.name for kind in program.meters]
     course, *of_meters = (taken("states", name, groups[name]) for name in ("course", *program.meter_groups))
     meters = ", ".join(f"{name}={value}" for name, value in zip(names, of_meters, strict=True))

@@ -66,7 +66,9 @@ def settings_of(scenario: Scenario, recorded: float | None) -> tuple[ExportParam
 
     ``recorded`` is the output interval [s] of a walk, which follows from its duration; else the scenario has its own.
     """
-    run, device, period = scenario.run, scenario.device, scenario.controller.period
+    run = scenario.run
+    device = scenario.device
+    period = scenario.controller.period
     # Without unused coefficients of an orifice, effects that are off, and other spellings of a number.
     unused = {"controller.rate"}
     unused |= {f"{section}.{name}" for section in ("valve", "actuator.leak") for name in other_form(device, section)}
@@ -78,7 +80,8 @@ def settings_of(scenario: Scenario, recorded: float | None) -> tuple[ExportParam
     if recorded is None:
         # The step of the file, from which the engine makes one that divides a sample.
         texts = time_texts(scenario)
-        links, step = links_of_times(texts), value_at(texts, "run.step")
+        links = links_of_times(texts)
+        step = value_at(texts, "run.step")
         follows = links["run.step"][0].number(times.__getitem__) if step is None else parse_quantity(str(step), "s")
         times["run.step"] = follows
     else:
@@ -127,12 +130,15 @@ def relations_of_vane(scenario: Scenario) -> tuple[Relation, ...]:
 
 def rules_of_table(scenario: Scenario, settings: Iterable[ExportParameter]) -> tuple[Condition, ...]:
     """Return the rules of a measured volume table, which must cover the stops and the supplies; empty without one."""
-    table, supply = scenario.device.actuator.table, scenario.device.supply
+    table = scenario.device.actuator.table
+    supply = scenario.device.supply
     if table is None:
         return ()
     lowest, highest = (COVERED_PRESSURE * pressure for pressure in measured_pressures(table))
     within = f">= {lowest!r}" if supply.is_vacuum else f"<= {highest!r}"
-    low, high, known = "actuator_angle_min", "actuator_angle_max", {setting.path for setting in settings}
+    low = "actuator_angle_min"
+    high = "actuator_angle_max"
+    known = {setting.path for setting in settings}
     return (
         (f"{table.first_angle!r} <= settings->{low} + {SAME_STOP!r}", low),
         (f"settings->{high} <= {table.last_angle + SAME_STOP!r}", high),
@@ -148,7 +154,8 @@ def all_opposite(relation: str, known: Collection[str]) -> str:
 
     Then another program runs, with suction or without; between the two, supplies contradict each other.
     """
-    sign, room = "<=" if relation == "at least" else ">=", c_identifier(ATMOSPHERE_PATH)
+    sign = "<=" if relation == "at least" else ">="
+    room = c_identifier(ATMOSPHERE_PATH)
     names = [c_identifier(path) for path in SUPPLIES if path in known]
     return " && ".join(f"settings->{name} {sign} settings->{room}" for name in names)
 

@@ -35,7 +35,8 @@ def model_description(interface: Interface, fmi: int, identifier: str, token: st
 
     ``identifier`` names the library, ``token`` identifies its sources.
     """
-    variables, is_alone = variables_of(interface), interface.plant is not None
+    variables = variables_of(interface)
+    is_alone = interface.plant is not None
     root = Xml.Element(
         "fmiModelDescription",
         {
@@ -49,7 +50,8 @@ def model_description(interface: Interface, fmi: int, identifier: str, token: st
             "variableNamingConvention": "structured",
         },
     )
-    state, is_loop = ("state" if fmi == 2 else "State"), str(not is_alone).lower()
+    state = "state" if fmi == 2 else "State"
+    is_loop = str(not is_alone).lower()
     able = {"modelIdentifier": identifier, f"canGetAndSetFMU{state}": "true", f"canSerializeFMU{state}": "true"}
     able |= {"canNotUseMemoryManagementFunctions": "true"} if fmi == 2 else {}
     able["canHandleVariableCommunicationStepSize"] = is_loop

@@ -109,10 +109,12 @@ def variables_of(interface: Interface) -> tuple[FmuVariable, ...]:
 
     The C code uses the same numbers; these also count hidden settings.
     """
-    library, program = interface.library, interface.library.program
+    library = interface.library
+    program = interface.library.program
     rows: list[tuple[Any, ...]] = []
     for setting in library.settings:
-        quantity, tuning = setting.quantity, tuning_of(interface, setting)
+        quantity = setting.quantity
+        tuning = tuning_of(interface, setting)
         limits = (end if abs(end) < _LARGEST_LIMIT else None for end in (quantity.minimum, quantity.maximum))
         meaning = quantity.summary or quantity.name
         rows.append((setting.path, quantity.unit, meaning, "parameter", tuning, setting.value, *limits))

@@ -55,8 +55,11 @@ class _Instance:
     """Instance of a unit, in FMI 3 without event mode; calls return the status, 0 for success."""
 
     def __init__(self, library: ctypes.CDLL, fmi: int, token: str) -> None:
-        self.library, self.fmi = library, fmi
-        name, word, none = c_char_p(_NAME), c_char_p(token.encode()), c_void_p(None)
+        self.library = library
+        self.fmi = fmi
+        name = c_char_p(_NAME)
+        word = c_char_p(token.encode())
+        none = c_void_p(None)
         words: tuple[Any, ...] = (name, word, none, *(c_bool(False),) * 4, none, c_size_t(0), none, none, none)
         if fmi == 2:
             words = (name, c_int(_CO_SIMULATION), word, none, none, c_int(0), c_int(0))
@@ -196,8 +199,10 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
 
 def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
     """Return the sources by name, with a placeholder for the token."""
-    library, plant = interface.library, interface.plant
-    name, written = library.name, library_files(library)
+    library = interface.library
+    plant = interface.plant
+    name = library.name
+    written = library_files(library)
     paths = "\n".join(f'    "{setting.path}",' for setting in library.settings)
     words = {
         "name": name,

@@ -70,12 +70,14 @@ Contact = tuple[float | None, float | None]
 def contacts_of(force: Signal) -> list[Contact]:
     """Return heel strike and toe-off of every contact [s]; None for an end that is outside the record."""
     # Between both thresholds the foot is as it was before.
-    is_loaded, is_unloaded = force.values > LOADED, force.values < UNLOADED
+    is_loaded = force.values > LOADED
+    is_unloaded = force.values < UNLOADED
     is_decided = is_loaded | is_unloaded
     first_decided = int(np.argmax(is_decided))
     latest = np.maximum.accumulate(np.where(is_decided, np.arange(is_decided.size), first_decided))
     on_ground = is_loaded[latest]
-    time, size = force.time, on_ground.size
+    time = force.time
+    size = on_ground.size
     edges = [0, *(np.flatnonzero(np.diff(on_ground.astype(int))) + 1).tolist(), size]
     # Short breaks are closed first: a contact in pieces would otherwise be dropped piece by piece.
     joined: list[tuple[int, int]] = []
@@ -98,7 +100,8 @@ def contacts_of(force: Signal) -> list[Contact]:
 
 def _crossing(signal: Signal, index: int, level: float) -> float:
     """Return the time [s] at which the line between the samples before and at ``index`` crosses a level."""
-    before, after = signal.values[index - 1], signal.values[index]
+    before = signal.values[index - 1]
+    after = signal.values[index]
     fraction = 0.5 if after == before else float(np.clip((level - before) / (after - before), 0.0, 1.0))
     return float(signal.time[index - 1] + fraction * (signal.time[index] - signal.time[index - 1]))
 
@@ -115,7 +118,8 @@ def force_of_plates(
             plate = with_absence(Signal(table.file, table.time, values / (body_mass * STANDARD_GRAVITY)))
             contacts = [(start, end) for start, end in contacts_of(plate) if _is_of_foot(start, end, plate, shank)]
             if contacts:
-                inside, step = np.zeros(plate.time.size, dtype=np.bool_), 1.0 / plate.rate
+                inside = np.zeros(plate.time.size, dtype=np.bool_)
+                step = 1.0 / plate.rate
                 for start, end in contacts:
                     is_after = plate.time >= (-np.inf if start is None else start - step)
                     inside |= is_after & (plate.time <= (np.inf if end is None else end + step))
@@ -173,7 +177,8 @@ def wrap_cycle(walk: Mapping[str, Signal]) -> tuple[dict[str, Signal], float, fl
     if misfits[best] > _MISFIT:
         return None
     period = float(shifts[best]) / _RATE
-    wrapped, turns = {}, np.arange(3)
+    wrapped = {}
+    turns = np.arange(3)
     for name, signal in walk.items():
         slack = 1.0 / signal.rate
         if signal.time[0] > start + slack or signal.time[-1] < start + period - slack:
@@ -361,7 +366,8 @@ def _ends_of_swings(smooth: Signal) -> list[int]:
     """Return the samples at which the forward swings of a smoothed shank angle end."""
     from scipy.signal import find_peaks
 
-    high, low = float(np.max(smooth.values)), float(np.min(smooth.values))
+    high = float(np.max(smooth.values))
+    low = float(np.min(smooth.values))
     apart = max(1, int(_SHORTEST_STRIDE * smooth.rate))
     return [int(peak) for peak in find_peaks(smooth.values, height=high - _TOP * (high - low), distance=apart)[0]]
 

@@ -92,7 +92,8 @@ class CurveStatistics:
         """Mean over the strides (101,); of a centre of pressure, which is undefined in swing, a line over the swing."""
         mean = self.curves.mean(axis=0)
         if self.name == "centre_of_pressure":
-            at, first = PHASES[self._inside], float(mean[self._inside][0])
+            at = PHASES[self._inside]
+            first = float(mean[self._inside][0])
             # The line goes on into the next stride, where the stance begins again.
             mean = np.interp(PHASES, [*at, 1.0 + at[0]], [*mean[self._inside], first], period=None)
         return np.asarray(mean)
@@ -203,7 +204,8 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
             wrong.append(DataError(f"{way.file}: {against} walking direction"))
     raise_noted(wrong)
     less = ": heel strikes and toe-offs are from shank_angle and less exact" if footfalls.events == SHANK else ""
-    foot, count = source.columns.ankle_angle, len(strides.taken)
+    foot = source.columns.ankle_angle
+    count = len(strides.taken)
     remarks = [
         *(*source.remarks, *footfalls.remarks, *unmeasured),
         *(f"stride from {each.start:.4g} to {each.end:.4g} s left out: {why}" for each, why in strides.left_out),
@@ -217,7 +219,8 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
             for _, message in _scatters(curves, REMARKED_SPREAD, REMARKED_MISFIT)
         ),
     ]
-    settings, names = source.settings, ", ".join(Path(table.file).name for table in source.tables)
+    settings = source.settings
+    names = ", ".join(Path(table.file).name for table in source.tables)
     # A file states that it was made by a model, never that it was measured.
     origin: Origin = "imported" if all(table.kind == "measured" for table in source.tables) else "synthetic"
     times, shares = ([getattr(stride, name) for stride in strides.taken] for name in ("time", "stance_share"))
@@ -258,7 +261,8 @@ def _curves_over_strides(
     A stride is rejected if its duration differs from the median by more than LARGEST_STRIDE_CHANGE, or if it has lost
     samples. Problems are added to ``wrong``. Raises DataError, with all of them, without strides or without an angle.
     """
-    cut_off, recorded = source.settings.low_pass, footfalls.walk
+    cut_off = source.settings.low_pass
+    recorded = footfalls.walk
     least = source.settings.least_strides or (1 if footfalls.is_one_cycle or footfalls.is_overground else LEAST_STRIDES)
     whole = usable_strides(recorded, footfalls.strides)
     # The median: one stop among ten strides would move a mean.
@@ -294,7 +298,8 @@ def _curves_over_strides(
             taken = tuple(curve.strides[row] for row in kept_rows)
             remaining[name] = replace(curve, curves=curve.curves[kept_rows], strides=taken)
             continue
-        file, time = walk[name].file, walk[name].time
+        file = walk[name].file
+        time = walk[name].time
         wrong.append(
             DataError(
                 f"{file}: {name}, {time[0]:.4g} to {time[-1]:.4g} s, covers no whole stride (first stride: "
@@ -374,11 +379,13 @@ def constant_stretches(time: Floats, values: Floats, spans: Sequence[tuple[float
     # Rounding makes equal steps of a sensor differ in the last digits.
     smallest = 1.001 * float(np.min(steps[steps > 0.0]))
     is_coarse = smallest > _COARSE * float(np.nanmax(values) - np.nanmin(values))
-    starts, ends = np.concatenate([[0], moves + 1]), np.concatenate([moves, [values.size - 1]])
+    starts = np.concatenate([[0], moves + 1])
+    ends = np.concatenate([moves, [values.size - 1]])
     long = time[ends] - time[starts] > LONGEST_HELD
     stretches = []
     for first, last in zip(starts[long].tolist(), ends[long].tolist(), strict=True):
-        start, end = float(time[first]), float(time[last])
+        start = float(time[first])
+        end = float(time[last])
         inside = sum(max(0.0, min(end, high) - max(start, low)) for low, high in spans)
         # A coarse sensor rests at a value that it enters and leaves by a few of its smallest steps.
         beside = [float(steps[place]) for place in (first - 1, last) if 0 <= place < steps.size]
@@ -444,7 +451,8 @@ def _scatters(
         moved = float(np.ptp(curve.mean))
         if moved <= 0.0:
             continue
-        spread, misfit = curve.spread / moved, curve.fitted[1].root_mean_square / moved
+        spread = curve.spread / moved
+        misfit = curve.fitted[1].root_mean_square / moved
         if spread > most_spread or misfit > most_misfit:
             yield (
                 name,

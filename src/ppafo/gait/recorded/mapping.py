@@ -153,7 +153,8 @@ class GaitMap:
 
     def __post_init__(self) -> None:
         """Take the axes that the ankle does not state from the shank: one walk has one forward axis."""
-        shank, ankle = self.shank_angle, self.ankle_angle
+        shank = self.shank_angle
+        ankle = self.ankle_angle
         if ankle is not _ANKLE:
             own = replace(ankle, forward=ankle.forward or shank.forward, vertical=ankle.vertical or shank.vertical)
             object.__setattr__(self, "ankle_angle", own)
@@ -216,7 +217,9 @@ def load_map(path: str | Path) -> GaitMap:
     """Load a gait map from a TOML file; raises DataError if it cannot be used."""
     loaded, file = read_record(FILE, GaitMap, path)
     wrong = []
-    shank, ankle, knee = loaded.shank_angle, loaded.ankle_angle, loaded.knee
+    shank = loaded.shank_angle
+    ankle = loaded.ankle_angle
+    knee = loaded.knee
     for name, terms, markers in (
         ("shank_angle", shank.terms, {"knee": shank.knee, "ankle": shank.ankle}),
         ("ankle_angle", ankle.terms, {"heel": ankle.heel, "toe": ankle.toe}),
@@ -274,11 +277,15 @@ class ImportSettings:
     def __post_init__(self) -> None:
         """Raise ArgumentError for a setting of another type, such as a text with a unit in place of a number."""
         for each in fields(self):
-            value, kind, words = getattr(self, each.name), cast("type", Real), "a number in SI units"
+            value = getattr(self, each.name)
+            kind = cast("type", Real)
+            words = "a number in SI units"
             if isinstance(each.default, str):
-                kind, words = str, "a text"
+                kind = str
+                words = "a text"
             elif each.name == "columns":
-                kind, words = GaitMap, "a GaitMap"
+                kind = GaitMap
+                words = "a GaitMap"
             if not (isinstance(value, kind) or value is each.default is None):
                 raise ArgumentError(f"{each.name}: must be {words}, not {value!r}")
         if self.side not in get_args(Side):

@@ -65,7 +65,8 @@ def without_ends(signal: Signal) -> Signal:
     """Return a motion from its first to its last valid sample, with gaps interpolated linearly and marked as lost."""
     valid = np.flatnonzero(np.isfinite(signal.values))
     inside = slice(int(valid[0]), int(valid[-1]) + 1)
-    time, values = signal.time[inside], signal.values[inside]
+    time = signal.time[inside]
+    values = signal.values[inside]
     gaps = ~np.isfinite(values)
     if not gaps.any():
         return replace(signal, time=time, values=values)
@@ -117,7 +118,8 @@ class CurveColumns:
             if self.unit_key.partition(".")[0] not in LOADS:
                 with noted_in(wrong):
                     check_recorded(self.table.columns[name], f"{self.table.file}: column {name!r}")
-            where, unit = f"{self.table.file}: column {name!r}", stated or self.table.units[name]
+            where = f"{self.table.file}: column {name!r}"
+            unit = stated or self.table.units[name]
             problem = f" [{unit}]: " if unit else f" has no unit, in the file or as {self.unit_key} of a gait map"
             for si_unit in (*si_units, _RATE) if unit else ():
                 try:
@@ -129,7 +131,9 @@ class CurveColumns:
                 if si_unit == _RATE:
                     problem += _NOT_INTEGRATED
                     break
-                total, chosen, problem = total + sign * (zero + (one - zero) * self.table.columns[name]), si_unit, ""
+                total = total + sign * (zero + (one - zero) * self.table.columns[name])
+                chosen = si_unit
+                problem = ""
                 break
             wrong += [DataError(f"{where}{problem}")] if problem else []
         raise_noted(wrong)
@@ -164,7 +168,8 @@ def refuse_missing(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTa
     The message has the nearest name for each missing column, and the columns and remarks of the files, shortened. A
     column name that a file has more than once is another fault.
     """
-    known, reasons = [name for table in tables for name in table.columns], []
+    known = [name for table in tables for name in table.columns]
+    reasons = []
     files = ", ".join(table.file for table in tables)
     for curve, wanted in names.items():
         missing = next((name for name in wanted if name not in known), wanted[0])
@@ -220,7 +225,8 @@ def knee_signals(
             )
         # The file has the hip: the knee follows by the lean of the thigh.
         forward, up = knee_position(forward, up, lean, _thigh_length(mapped, stature))
-    file, time = found.table.file, found.table.time
+    file = found.table.file
+    time = found.table.time
     columns = tuple(dict.fromkeys(name for _, name in found.terms))
     return {
         "knee_forward": Signal(file, time, forward, unit == "m", columns),

@@ -129,7 +129,8 @@ def walk_signals(
     walk: dict[str, Signal] = {}
     # The shank stands first: an ankle from markers of the foot turns against it.
     for name in _UNITS:
-        mapped, found = getattr(columns, name), None
+        mapped = getattr(columns, name)
+        found = None
         with noted_in(wrong):
             found = find_columns(name, mapped, tables, name not in {*required, *REQUIRED})
             if found is None:
@@ -155,7 +156,8 @@ def _curve_of(name: str, columns: CurveColumns, mapped: MappedCurve, body_mass: 
     """Return the signal of a curve in SI units and package signs; loads are relative to ``body_mass`` [kg]."""
     if isinstance(mapped, ShankMap) and mapped.terms is None:
         ahead, up = between_markers(columns, mapped, str(mapped.knee), str(mapped.ankle))
-        values, unit = np.asarray(np.arctan2(ahead, -up), dtype=np.float64), "rad"
+        values = np.asarray(np.arctan2(ahead, -up), dtype=np.float64)
+        unit = "rad"
     else:
         values, unit = columns.in_unit(mapped.unit, _UNITS[name])
     if isinstance(mapped, AngleMap):
@@ -175,7 +177,8 @@ def between_markers(
     for name, values in marker.items():
         check_recorded(values, f"{columns.table.file}: column {name!r}")
     forward, vertical = mapped.axes
-    axis, sign = forward.removeprefix("-"), -1.0 if forward.startswith("-") else 1.0
+    axis = forward.removeprefix("-")
+    sign = -1.0 if forward.startswith("-") else 1.0
     ahead = sign * (marker[f"{second}.{axis}"] - marker[f"{first}.{axis}"])
     return ahead, marker[f"{second}.{vertical}"] - marker[f"{first}.{vertical}"]
 
@@ -189,7 +192,8 @@ def foot_markers_angle(columns: CurveColumns, mapped: AngleMap, shank: Signal) -
     pitch = Signal(columns.table.file, columns.table.time, np.arctan2(up, ahead))
     recorded = without_ends(pitch)
     inside = (recorded.time >= shank.time[0]) & (recorded.time <= shank.time[-1])
-    time, values = recorded.time[inside], recorded.values[inside]
+    time = recorded.time[inside]
+    values = recorded.values[inside]
     lean = np.interp(time, shank.time, shank.values)
     lost = np.zeros(time.size, dtype=np.bool_) if recorded.lost is None else recorded.lost[inside]
     if shank.lost is not None:
@@ -294,7 +298,8 @@ def _completed_map(own: GaitMap | None, tables: Sequence[MotionTable], side: Sid
     """
     if own is None:
         return find_convention(tables, side, body_mass)
-    named, problems = {name: unsigned_names(getattr(own, name)) for name in own.named}, []
+    named = {name: unsigned_names(getattr(own, name)) for name in own.named}
+    problems = []
     # The format shall not judge the units of loads whose columns the map names.
     loads = {marker_of(column) for name in LOADS for column in named.get(name, ())}
     kept = [[name for name in table.columns if marker_of(name) not in loads] for table in tables]
@@ -427,7 +432,8 @@ def _read_tables(
     wrong += [DataError(table.problem) for table in read if table.problem]
     arranged = []
     for table in read:
-        found, kept = FORMS[table.form].arrange(table), own & table.columns.keys()
+        found = FORMS[table.form].arrange(table)
+        kept = own & table.columns.keys()
         columns = {**found.columns, **{name: table.columns[name] for name in kept}}
         units = {**found.units, **{name: table.units[name] for name in kept}}
         arranged.append(replace(found, columns=columns, units=units))

@@ -72,7 +72,8 @@ class MotionTable:
 def mean_stride_table(table: MotionTable, stride_time: float) -> MotionTable:
     """Return a mean stride over percent, in its first column, over time, repeated; unchanged without such a column."""
     percent = next(iter(table.columns.values()))
-    steps, ends = np.diff(percent), np.abs(percent[[0, -1]] - [0.0, 100.0])
+    steps = np.diff(percent)
+    ends = np.abs(percent[[0, -1]] - [0.0, 100.0])
     if not (np.all(steps > 0.0) and np.all(ends < _ENDS_OF_STRIDE) and percent[0] >= 0.0 and percent[-1] <= 100.0):
         return table
     # 100 % is 0 % of the next stride.
@@ -164,7 +165,8 @@ def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTabl
         if len(own) < 2:
             continue
         at = np.array([columns[name] for name in own]) * metres_in(table, own[0])
-        recorded, zero = np.isfinite(at).all(axis=0), (at == 0.0).all(axis=0)
+        recorded = np.isfinite(at).all(axis=0)
+        zero = (at == 0.0).all(axis=0)
         steps = np.abs(np.diff(at, axis=1))
         is_coarse = steps.any() and float(np.min(steps, initial=np.inf, where=steps > 0.0)) > _COARSE
         # A marker that is repeated up to the end of the file never jumps; one that never moves is a point of the lab.
@@ -200,7 +202,9 @@ def fill_gaps(table: MotionTable, names: Iterable[str], longest: float) -> Motio
     """
     from scipy.interpolate import CubicSpline
 
-    columns, remarks, time = dict(table.columns), [], table.time
+    columns = dict(table.columns)
+    remarks = []
+    time = table.time
     for name in dict.fromkeys(names):
         if name not in columns or longest <= 0.0:
             continue

@@ -144,7 +144,8 @@ class FlowLaw(bench.BenchLaw):
         elif (species := SPECIES.get(self.gas)) is None:
             raise IdentificationError(f"{context.label}: gas = {self.gas!r} is unknown{known_names(self.gas, SPECIES)}")
         else:
-            molar_mass, heat_capacity_ratio = species.molar_mass, species.heat_capacity_ratio
+            molar_mass = species.molar_mass
+            heat_capacity_ratio = species.heat_capacity_ratio
         for source in (source for source in sources if "mass_flow" in source.recording):
             stated = source.recording.channels["mass_flow"].stated
             metered = molar_mass_in(stated)
@@ -189,7 +190,8 @@ def readings_in_flow(
     single one shows nothing, and at least ``fewest`` others must be left.
     """
     first, second, flow = (pool(sources, name) for name in (*names, "mass_flow"))
-    difference, size = first - second, np.abs(flow)
+    difference = first - second
+    size = np.abs(flow)
     widest, largest = (float(np.abs(each[used]).max(initial=0.0)) for each in (difference, flow))
     is_small = used & (size <= max(_FLOW_AT_REST, tolerances.zero_of_flow) * largest)
     is_small &= np.abs(difference) <= _APART_AT_REST * widest
@@ -197,12 +199,14 @@ def readings_in_flow(
     # Of a small flow noise may cross the pressures too, but at rest the meter shows one reading.
     shown = float(np.quantile(flow[is_crossed], 0.25)) if is_crossed.any() else 0.0
     is_at_rest = is_small & (np.abs(flow - shown) <= _FLOW_AT_REST * largest)
-    count, total = np.count_nonzero(is_at_rest), np.count_nonzero(used)
+    count = np.count_nonzero(is_at_rest)
+    total = np.count_nonzero(used)
     if count < _FEWEST_AT_REST or total - count < fewest:
         return used, (), ()
     zeros = list[FitNumber]()
     for path, values, span in ((ZERO, flow, largest), (f"zero of {names[0]}", difference, widest)):
-        deviation, mean = float(np.std(values[is_at_rest])), float(np.mean(values[is_at_rest]))
+        deviation = float(np.std(values[is_at_rest]))
+        mean = float(np.mean(values[is_at_rest]))
         # A zero may drift from reading to reading, so that more of them tell no more.
         zeros += tolerance(path, max(deviation, _FINEST * span), mean)
     zeros += bench.within(tolerances.zero_of_pressure, _COMMON_ZERO)
@@ -348,17 +352,22 @@ def opening_of(
 
     ``section`` is that of the opening in a set; a size that a set has not is of the ``noun``.
     """
-    own, laminar, unit = "open_valve_flow", "open_valve_flow.laminar_coefficient", "kg/(s Pa^2)"
+    own = "open_valve_flow"
+    laminar = "open_valve_flow.laminar_coefficient"
+    unit = "kg/(s Pa^2)"
     if noun == "leak":
-        own, laminar = "vane_leak", GAP
+        own = "vane_leak"
+        laminar = GAP
     gap = FitNumber(laminar, unit=unit, text="Laminar coefficient of a gap beside the orifice")
-    path, known = f"{own}.effective_area", 1.0
+    path = f"{own}.effective_area"
+    known = 1.0
     size = FitNumber(path, unit="m^2", text=f"Effective area Cd A of the {noun}")
     if law == "laminar":
         size = FitNumber(f"{own}.laminar_coefficient", unit=unit, text=f"Laminar coefficient of the {noun}")
     elif law == "iso6358" or critical_ratio is not None:
         of_ratio = "" if critical_ratio is None else f" with the set's b = {critical_ratio:g}"
-        path, text = f"{section}.sonic_conductance", f"Sonic conductance C of the {noun}{of_ratio}"
+        path = f"{section}.sonic_conductance"
+        text = f"Sonic conductance C of the {noun}{of_ratio}"
         size = FitNumber(path, unit="m^3/(s Pa)", text=text)
     elif of_set is not None:
         size, known = of_set
@@ -450,7 +459,9 @@ class OpenValveFlowProblem(FlowLaw):
         6358 where the set has its b. With the area of the set, an orifice is its Cd. Raises IdentificationError for
         recordings that do not determine the law.
         """
-        gas, path, zero = self.gas_of(sources, context), context.valve_path(self.valve), context.tolerances.zero_of_flow
+        gas = self.gas_of(sources, context)
+        path = context.valve_path(self.valve)
+        zero = context.tolerances.zero_of_flow
         area, critical_ratio = (context.number(f"{path}.{name}") for name in ("area", "critical_ratio"))
         readings.check_sources(sources, _MINIMUM_SAMPLES, absolute=VALVE_PRESSURES)
         commands = []
@@ -494,7 +505,8 @@ class OpenValveFlowProblem(FlowLaw):
         fitted, model = solve_flow(opening, pressures, flow, groups, context.tolerances, self.confidence, zeros=zeros)
         scatter = float(np.std(flow - model) / flow.max())
         # Densely, so that the curve has no kinks at the readings; between them the upstream pressure is interpolated.
-        dense, order = np.linspace(ratio.min(), ratio.max(), 200), np.argsort(ratio)
+        dense = np.linspace(ratio.min(), ratio.max(), 200)
+        order = np.argsort(ratio)
         first = np.interp(dense, ratio[order], upstream[order])
         shown = dict(zip(pressures, (first, dense * first), strict=True))
         law_flow = flow_through(defaultdict(float, fitted.by_name), opening, shown)

@@ -111,7 +111,8 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None, nu
     # A start that the user gave is after the push, which ends a little after the highest speed of the smoothed signal.
     fastest = int(np.argmax(np.abs(speeds))) if start is None else 0
     pushed = smoothing_width(part.time.size) // 2 if start is None else 0
-    time, angle = part.time[fastest:], part[_ANGLE][fastest:]
+    time = part.time[fastest:]
+    angle = part[_ANGLE][fastest:]
     # Friction alone stops the vane.
     turn = max(np.argmin(angle), np.argmax(angle))
     distance = np.abs(angle - angle[turn])
@@ -130,7 +131,8 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None, nu
     last = first + int(np.argmax(is_back)) if is_back.any() else part.time.size
     until = "samples from the highest speed to the first reversal or end"
     readings.check_enough(source, last - first, _MINIMUM_SAMPLES, until)
-    time, angle = part.time[first:last], part[_ANGLE][first:last]
+    time = part.time[first:last]
+    angle = part[_ANGLE][first:last]
     for plateau in plateaus(angle):
         if is_at_limit(angle, plateau):
             source.refuse(
@@ -155,7 +157,8 @@ def smoothed_rates(time: Floats, angle: Floats) -> tuple[Floats, Floats]:
 
     # The filter wants an even clock.
     even = np.linspace(time[0], time[-1], time.size)
-    step, width = float(even[1] - even[0]), smoothing_width(time.size)
+    step = float(even[1] - even[0])
+    width = smoothing_width(time.size)
     values = np.interp(even, time, angle)
     rates = [savgol_filter(values, width, 2, deriv=order, delta=step) for order in (1, 2)]
     velocity, acceleration = (np.interp(time, even, rate) for rate in rates)
@@ -193,7 +196,8 @@ def fall_to_standstill(speed: float, slowing: Slowing) -> tuple[Floats, Floats, 
     """
     # Cubed, for the slowing near standstill, where a seal grips, needs the shortest steps.
     speeds = speed * np.linspace(1.0, 0.0, _STEPS + 1) ** 3
-    middle, half = 0.5 * (speeds[1:] + speeds[:-1]), 0.5 * (speeds[:-1] - speeds[1:])
+    middle = 0.5 * (speeds[1:] + speeds[:-1])
+    half = 0.5 * (speeds[:-1] - speeds[1:])
     nodes = middle[:, None] + half[:, None] * _NODES
     decelerations = slowing.at(nodes)
     # Without any friction the time would be infinite.
@@ -335,7 +339,8 @@ def _panels(decays: Sequence[FreeDecay], model: Floats, slowing: Slowing) -> tup
     """Return two panels: angle over time, and acceleration over velocity with the straight line of equation (1)."""
     angles = []
     rates = []
-    measured, fitted = "measured", "fitted"
+    measured = "measured"
+    fitted = "fitted"
     fastest = 0.0
     for decay in decays:
         angles.append(readings_mark(measured, decay.time, decay.angle))

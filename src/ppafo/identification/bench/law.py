@@ -136,7 +136,8 @@ def result_of(
 
     ``reason`` says more of a conflict, if readings contradict the others; ``scatter`` is the field of the result.
     """
-    origin, conflict = [source.trace for source in sources], "" if fitted.conflict is None else fitted.conflict.words
+    origin = [source.trace for source in sources]
+    conflict = "" if fitted.conflict is None else fitted.conflict.words
     conflict = f"{conflict}; {reason}" if conflict and reason else conflict
     rows = [row for row, number in enumerate(fitted.numbers) if number.text]
     return BenchResult(

@@ -46,7 +46,8 @@ def without_wrong_samples(
     the converter is no outlier. Raises IdentificationError if more than 2 in 100 samples are outliers, with the
     recording, the sample, its value and the median of its neighbours.
     """
-    cleaned, remarks = [], []
+    cleaned = []
+    remarks = []
     for source in sources:
         recording = source.recording
         inside = np.flatnonzero(np.isin(recording.time, window(recording, start, end).time))
@@ -118,7 +119,8 @@ def check_no_wrong_reading(sources: Sources, name: str, drivers: Sequence[Floats
     """
     from scipy.spatial import cKDTree
 
-    values, samples = pool(sources, name)[used], np.flatnonzero(used)
+    values = pool(sources, name)[used]
+    samples = np.flatnonzero(used)
     if values.size < _FEWEST_ALIKE:
         return
     # By the usual size, not the range, which one wrong reading would stretch.

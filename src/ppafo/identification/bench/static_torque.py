@@ -101,7 +101,9 @@ class StaticTorqueProblem(bench.BenchLaw):
         counts = np.diff([*first, pressure.size])
         places = np.repeat(np.arange(counts.size), counts)
         pressure, load = (np.bincount(places, weights=values) / counts for values in (pressure, load))
-        branch, files, labels = branch[first], files[first], labels[first]
+        branch = branch[first]
+        files = files[first]
+        labels = labels[first]
         # The mean of n samples has the noise of one over sqrt(n).
         weight = np.sqrt(counts / counts.mean())
 
@@ -203,7 +205,8 @@ def _used_readings(sources: Sources, channel: str, zero_of_pressure: float) -> F
     resting = (direction > 0.0) & (load <= lowest + _FLAT * np.ptp(load))
     if lowest == 0.0 or (resting.any() and np.ptp(pressure[resting]) > np.ptp(pressure) / _BINS / 2.0):
         is_used &= ~resting
-    pressure, direction = pressure[is_used], direction[is_used]
+    pressure = pressure[is_used]
+    direction = direction[is_used]
     readings.check_enough(pooled, pressure.size, _MINIMUM_SAMPLES, "readings")
     for sign, name in ((1.0, "rising"), (-1.0, "falling")):
         if not (direction == sign).any():
@@ -217,7 +220,8 @@ def _used_readings(sources: Sources, channel: str, zero_of_pressure: float) -> F
     # From the lowest reading of each level, or one that lies across the end of an interval would count twice.
     levels = first = 0
     while first < ordered.size:
-        levels, first = levels + 1, np.searchsorted(ordered, ordered[first] + width, "right")
+        levels = levels + 1
+        first = np.searchsorted(ordered, ordered[first] + width, "right")
     if levels < _MINIMUM_LEVELS:
         why = f"{percentage(_SAME_LEVEL, 2)} of the highest" if width > zero_of_pressure else "[bench] zero_of_pressure"
         pooled.refuse(

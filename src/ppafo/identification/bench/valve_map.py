@@ -69,7 +69,8 @@ class ValveMapProblem(flow.FlowLaw):
         With nodes the opening is a table over the command in place of dead band, gain and saturation. Raises
         IdentificationError for recordings that do not determine the map.
         """
-        gas, path = self.gas_of(sources, context), context.valve_path(self.valve)
+        gas = self.gas_of(sources, context)
+        path = context.valve_path(self.valve)
         readings.check_sources(sources, _MINIMUM_SAMPLES, ("command", "mass_flow"), absolute=VALVE_PRESSURES)
         command, upstream, downstream = (pool(sources, name) for name in ("command", *VALVE_PRESSURES))
         is_read = np.ones(command.size, dtype=bool)
@@ -91,7 +92,6 @@ class ValveMapProblem(flow.FlowLaw):
             sources[0].refuse("the flow into chamber 1 falls as the command rises: a wrong sign of one of them")
         # Backlash is seen where the command both rises and falls.
         is_two_way = (branch > 0).any() and (branch < 0).any()
-        highest = size.max()
         band = f"{path}.dead_band"
         openings = [f"{SECTION}.opening.opening_{number:02}" for number in range(1, len(self.nodes) + 1)]
         pressures = dict(zip(VALVE_PRESSURES, (upstream, downstream), strict=True))
@@ -128,7 +128,7 @@ class ValveMapProblem(flow.FlowLaw):
             "mass_flow",
             np.where(branch < 0.0, "falling commands", "rising commands"),
             np.where(command > 0.0, "commands to chamber 1", "commands to chamber 2"),
-            np.where(size > 0.5 * highest, "large commands", "small commands"),
+            np.where(size > 0.5 * size.max(), "large commands", "small commands"),
         )
         fitted, model = bench.solve(shown, measured, groups, numbers, self.confidence)
         reason = ""
@@ -168,7 +168,7 @@ class ValveMapProblem(flow.FlowLaw):
         if self.nodes:
             return self._as_table(result, band)
         # Near the highest command there is no saturation to be seen.
-        seen = [item for item in result.estimates if item.path != _SATURATION or item.value < highest - _SATURATES]
+        seen = [item for item in result.estimates if item.path != _SATURATION or item.value < size.max() - _SATURATES]
         return replace(result, estimates=tuple(seen))
 
     def _unknowns(
@@ -195,7 +195,8 @@ class ValveMapProblem(flow.FlowLaw):
             unknowns = [bench.sought(_FULL, largest, 0.0, unit="m^2", text=of_full)]
             for name, node in zip(openings, self.nodes, strict=True):
                 near = float(np.median(areas[np.argsort(np.abs(size - node))[:3]]))
-                start, text = min(max(near / largest, 0.0), 1.0), f"Opening at a command of {node:g}"
+                start = min(max(near / largest, 0.0), 1.0)
+                text = f"Opening at a command of {node:g}"
                 unknowns.append(bench.sought(name, start, 0.0, 1.0, 1.0, text=text, size=1.0))
             return tuple(unknowns)
         half = float(size[areas > _HALF_OPEN * largest].min())
@@ -205,7 +206,8 @@ class ValveMapProblem(flow.FlowLaw):
         # Inside the bounds, so that the search can go either way.
         start = float(np.clip(np.median(shut) if shut.size else 0.0, 0.01 * half, 0.9 * half))
         # Just inside the highest command, beyond which no reading changes with it.
-        inside, end = 0.02 * half + 0.98 * highest, highest * (1.0 + 1e-9)
+        inside = 0.02 * half + 0.98 * highest
+        end = highest * (1.0 + 1e-9)
         of_band = "Dead band: command below which no gas flows, in both directions"
         of_gain = "Effective area Cd A per command beyond the dead band"
         of_end = "Saturation: command beyond which the opening is constant"
@@ -229,7 +231,8 @@ class ValveMapProblem(flow.FlowLaw):
             highest = max(highest, node.value)
             verdict = node.verdict if is_whole and node.is_usable else of_bound
             beside = {f"{SECTION}.opening.command_{number:02}": command, band: 0.0}
-            low, high = min(node.low, highest), max(node.high, highest)
+            low = min(node.low, highest)
+            high = max(node.high, highest)
             table.append(replace(node, value=highest, low=low, high=high, beside=beside, verdict=verdict))
         remark = (
             f"the openings are shares of {_FULL}, and the size of the valve in the set stays; no interval counts that "
@@ -257,7 +260,8 @@ def area_of_command(
 
     With ``round_off`` [-] both corners are rounded over about this range of the command, and gas flows from 0 on.
     """
-    size, ends = np.abs(command), np.array([[dead_band], [saturation]])
+    size = np.abs(command)
+    ends = np.array([[dead_band], [saturation]])
     if round_off > 0.0:
         rounded = round_off * np.logaddexp(0.0, (size - ends) / round_off)
         first, second = rounded - round_off * np.logaddexp(0.0, -ends / round_off)
@@ -271,7 +275,8 @@ def spool_of(command: Floats, width: float) -> Floats:
     """Return the spool command [-] after backlash of full ``width`` [-]; the spool starts at the first command."""
     if width <= 0.0:
         return command
-    position, positions = float(command[0]), []
+    position = float(command[0])
+    positions = []
     for requested in command.tolist():
         position = spool_position(position, requested, width)
         positions.append(position)

@@ -98,9 +98,11 @@ class LeakLaw(flow.FlowLaw):
         whether there is a gap hold for this model only. Raises IdentificationError for recordings that do not
         determine it.
         """
-        gas, of_set = self.gas_of(sources, context), None
+        gas = self.gas_of(sources, context)
+        of_set = None
         coefficient = context.number("actuator.leak.discharge_coefficient")
-        critical_ratio, own = context.number("actuator.leak.critical_ratio"), context.number("gas.molar_mass")
+        critical_ratio = context.number("actuator.leak.critical_ratio")
+        own = context.number("gas.molar_mass")
         if coefficient:
             text = (
                 f"Area of the leak with Cd = {coefficient:g} of the set; only the product Cd A is identified: a "
@@ -114,7 +116,11 @@ class LeakLaw(flow.FlowLaw):
             known_ratio = None if each == "iso6358" else critical_ratio
             openings.append(flow.opening_of("leak", "actuator.leak", gas, form, known_ratio, of_set))
         fits, has_both, summary, panels, remarks, scatter = self.leak(sources, context, openings)
-        opening, chosen, other, rival, reason = openings[0], fits[0], openings[-1], fits[-1], ""
+        opening = openings[0]
+        chosen = fits[0]
+        other = openings[-1]
+        rival = fits[-1]
+        reason = ""
         # A critical ratio that is sought must be determined too: one of both laws seeks it.
         _, low, high = CRITICAL_RATIOS
         is_sound = rival.conflict is None and (
@@ -191,7 +197,8 @@ class SteadyLeakProblem(LeakLaw):
         )
         first, second = pressures.values()
         # A wrong law gives different sizes at low and at high pressures.
-        difference, ratio = first - second, np.minimum(first, second) / np.maximum(first, second)
+        difference = first - second
+        ratio = np.minimum(first, second) / np.maximum(first, second)
         is_high = difference > np.median(difference)
         groups = recorded, "mass_flow", np.where(is_high, "flow at higher pressures", "flow at lower pressures")
         has_both = flow.has_both_regimes(openings[0], ratio, sources[0])
@@ -201,7 +208,8 @@ class SteadyLeakProblem(LeakLaw):
         ]
         model = fits[0][1]
         scatter = float(np.std(metered - model) / np.abs(metered).max())
-        series, curve = ("measured", "measured", difference, metered, model), LAW_NAMES[openings[0].law]
+        series = ("measured", "measured", difference, metered, model)
+        curve = LAW_NAMES[openings[0].law]
         axes = Kind("Pressure difference", "Pa_d", "pressure change"), Kind("Flow", "kg/s", "mass flow")
         panels = with_residuals("Steady leak", *axes, [series], [curve_mark(curve, difference, model)])
         summary = f"{metered.size} steady readings; scatter {scatter:.2%} of the largest flow"
@@ -329,7 +337,9 @@ class VaneLeakProblem(LeakLaw, bench.TimedLaw):
         Equations (4), (5): V1 = V_dead1 + v (theta - theta_min) and V2 = V_dead2 + v (theta_max - theta), with v the
         displacement per radian [m^3/rad].
         """
-        first, second, angle = self.volume_1, self.volume_2, self.angle
+        first = self.volume_1
+        second = self.volume_2
+        angle = self.angle
         deviation = context.tolerances.deviation_of("actuator.dead_volume_1", 1.0, 0.0)
         if angle is not None:
             if context.parameter_set.actuator_kind != VANE:
@@ -455,9 +465,11 @@ class VaneLeakProblem(LeakLaw, bench.TimedLaw):
 def _over_volume(size: FitNumber, chamber: int) -> FitNumber:
     """Return the reported size of the leak divided by the unknown volume of a chamber."""
     text = f"{size.text.partition(' with')[0]} over the volume of chamber {chamber}, which is not known"
-    path, unit = f"vane_leak.{size.path.split('.')[-1]}_over_volume", f"{size.unit[:-1]} m^3)"
+    path = f"vane_leak.{size.path.split('.')[-1]}_over_volume"
+    unit = f"{size.unit[:-1]} m^3)"
     if size.unit == "m^2":
-        path, unit = "vane_leak.area_over_volume", "1/m"
+        path = "vane_leak.area_over_volume"
+        unit = "1/m"
     return FitNumber(path, unit=unit, text=text)
 
 
@@ -480,9 +492,11 @@ def _unknowns(
     for decay in decays:
         for sensor, values in decay.sensors.items():
             scale = max(abs(decay.changes[decay.changing]), float(np.std(np.diff(values))), _LEAST_PRESSURE)
-            start, spread = values[: decay.edge].mean(), math.inf
+            start = values[: decay.edge].mean()
+            spread = math.inf
             if sensor == decay.room:
-                start, spread = values.mean(), max(values.std(), _LEAST_PRESSURE)
+                start = values.mean()
+                spread = max(values.std(), _LEAST_PRESSURE)
             name = _START.format(sensor, decay.number)
             unknowns.append(bench.sought(name, start, _LEAST_PRESSURE, scale=scale, deviation=spread))
         for sensor in decay.fitted:

@@ -162,7 +162,8 @@ class FittedExperiment:
 
         Samples of inputs are added later. A recorded initial state is taken from the samples up to the start.
         """
-        scenario, recording = self.scenario, self.recording
+        scenario = self.scenario
+        recording = self.recording
         if {*_SUPPLY_CHANNELS} & {*self.inputs}:
             scenario = replace(scenario, device=with_highest_supply(scenario.device, recording, self.inputs))
         if COMMAND in self.inputs:
@@ -191,7 +192,9 @@ class FittedExperiment:
 
     def check(self) -> None:
         """Raise IdentificationError for an experiment that cannot be fitted; the message begins with the label."""
-        recording, inputs, scenario = self.recording, self.inputs, self.scenario
+        recording = self.recording
+        inputs = self.inputs
+        scenario = self.scenario
         if (count := int((recording.time >= self.start - _FITS).sum())) < MINIMUM_SAMPLES:
             why = f"has {count} samples from the start at {self.start:g} s on, but needs at least {MINIMUM_SAMPLES}"
             raise IdentificationError(f"{self.where}: {recording.label} {why}")
@@ -199,8 +202,10 @@ class FittedExperiment:
             if name not in recording:
                 known = known_names(name, recording.names)
                 raise IdentificationError(f"{self.where}: {recording.label} has no channel '{name}'{known}")
-        motion, has_torque = vane_motion(scenario), EXTERNAL_TORQUE in inputs
-        is_prescribed, is_followed = motion.profile is not None, ANGLE in inputs and ANGLE in self.channels
+        motion = vane_motion(scenario)
+        has_torque = EXTERNAL_TORQUE in inputs
+        is_prescribed = motion.profile is not None
+        is_followed = ANGLE in inputs and ANGLE in self.channels
         is_python = scenario.controller.is_outside and COMMAND not in inputs
         refuse_first(
             self.where,
@@ -240,7 +245,8 @@ def full_path(path: str, scenario: Scenario) -> str:
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declarations of all parameters that can be fitted in this scenario, by path."""
-    device, moves = scenario.device, vane_motion(scenario).profile is None
+    device = scenario.device
+    moves = vane_motion(scenario).profile is None
     # An orifice has two forms, and the device one of them.
     other = {f"{section}.{name}" for section in ("actuator.leak", "valve") for name in other_form(device, section)}
     declared = {
@@ -276,7 +282,8 @@ def with_numbers(scenario: Scenario, changed: Mapping[str, float]) -> Scenario:
 
 def broken_rule(device: Device) -> str:
     """Return a sentence on a rule that the parameters of a device violate; empty for a valid device."""
-    dynamic, static = device.friction.dynamic_torque, device.friction.static_torque
+    dynamic = device.friction.dynamic_torque
+    static = device.friction.static_torque
     if dynamic > static:
         above = f"above friction.static_torque of {static:.3g} N m (fitted, or moved within its tolerance)"
         return f"friction.dynamic_torque was fitted to {dynamic:.3g} N m, {above}"
@@ -304,15 +311,19 @@ def number_of(parameter: FitNumber, experiments: Sequence[FittedExperiment]) -> 
         if channel in experiment.inputs:
             user = f"{experiment.where} uses the recorded '{channel}'"
             raise IdentificationError(f"{parameter.name}: has no effect, since {user}")
-    start, low, high = parameter.start, quantity.minimum, quantity.maximum
+    start = parameter.start
+    low = quantity.minimum
+    high = quantity.maximum
     first = experiments[0].begun
     # Of how a run begins the recording may say more than the scenario.
     start = number_at(first, path) if math.isnan(start) else start
     if path == TIME_OFFSET:
-        low, high = -LONGEST_TIME_OFFSET, LONGEST_TIME_OFFSET
+        low = -LONGEST_TIME_OFFSET
+        high = LONGEST_TIME_OFFSET
     elif start > 0.0:
         # A number above 0 is bounded by factors: with 0 as its lower bound a valve or an effect would be another model.
-        low, high = max(low, start / _FURTHEST) if low >= 0.0 else low, min(high, start * _FURTHEST)
+        low = max(low, start / _FURTHEST) if low >= 0.0 else low
+        high = min(high, start * _FURTHEST)
     low = low if math.isnan(parameter.low) else parameter.low
     high = high if math.isnan(parameter.high) else parameter.high
     bounds = f"{low:.6g} and {high:.6g}"
@@ -337,7 +348,9 @@ def number_of(parameter: FitNumber, experiments: Sequence[FittedExperiment]) -> 
         ),
     )
     if parameter.is_logarithm:
-        start, low, high = math.log(start), math.log(low), math.log(high)
+        start = math.log(start)
+        low = math.log(low)
+        high = math.log(high)
     # Differences are a thousandth of the scale at most, which for a prior is a tenth of its deviation.
     scale = _SCALE * parameter.deviation if is_known else abs(start) or 0.5 * (high - low)
     unit = quantity.unit.removesuffix("_a").removesuffix("_d") or "-"
@@ -411,8 +424,11 @@ def tolerance_parameters(
     parameters: list[FitNumber] = []
     for experiment in experiments:
         free = {full_path(item.path, experiment.scenario) for item in fitted if item.acts_in(experiment.label)}
-        inputs, recording, is_read = experiment.inputs, experiment.recording, experiment.is_read
-        motion, actuator = experiment.begun.motion, experiment.begun.device.actuator
+        inputs = experiment.inputs
+        recording = experiment.recording
+        is_read = experiment.is_read
+        motion = experiment.begun.motion
+        actuator = experiment.begun.device.actuator
         # Of a vane that moves freely, or on a leg.
         own = motion if isinstance(motion, FreeMotion) else None
         found = {}
@@ -436,7 +452,8 @@ def tolerance_parameters(
             found["motion.angular_velocity"] = start[2]
             found.setdefault("motion.angle", read)
         for name in ("pressure_1", "pressure_2"):
-            noise, stated = read_error(recording, name) if is_read else 0.0, tolerances.start_of_pressure
+            noise = read_error(recording, name) if is_read else 0.0
+            stated = tolerances.start_of_pressure
             found[f"initial.{name}"] = noise if stated is None else deviation_of_limit(stated)
         for path in (path for path, deviation in found.items() if path not in free and deviation > 0.0):
             start_of_path = number_at(experiment.begun, path)
@@ -457,7 +474,8 @@ def tolerance_parameters(
                 if (channel in item.channels and (kind != "lag" or regular_interval(item.recording.time)))
                 or (kind == "zero" and channel in item.inputs)
             )
-            path, limit = f"{prefix}{channel}", limit_of(channel)
+            path = f"{prefix}{channel}"
+            limit = limit_of(channel)
             if not labels or path in given:
                 continue
             common = () if len(labels) == len(experiments) else labels
@@ -499,13 +517,15 @@ def _of_device(
         yield from _held(path, value, tolerances.deviation_of(kind, value, stated), quantity)
     limit = tolerances.stribeck_velocity
     moves = any(vane_motion(item.scenario).profile is None and ANGLE not in item.inputs for item in experiments)
-    friction, has_own = scenario.device.friction, number_at(scenario, _STRIBECK) > 0.0
+    friction = scenario.device.friction
+    has_own = number_at(scenario, _STRIBECK) > 0.0
     if has_own or not moves or friction.static_torque <= friction.dynamic_torque:
         return
     is_sought = _STRIBECK in given
     if not is_sought and limit > 0.0:
         start = limit * math.exp(-_ONE_SIDED * _FACTOR)
-        low, high = _LEAST * limit, 4.0 * limit
+        low = _LEAST * limit
+        high = 4.0 * limit
         yield FitNumber(_STRIBECK, start, low, high, deviation=_FACTOR, is_tolerance=True, is_logarithm=True)
     share = number_at(scenario, _SHARE)
     if (is_sought or limit > 0.0) and _SHARE not in given:
@@ -532,9 +552,11 @@ def experiment_of(entry: ExperimentSection, context: BenchContext, reader: Recor
     if others:
         trial = f"columns.{entry.columns}.trial"
         raise IdentificationError(f"{where}: {entry.recording} has {1 + len(others)} trials; name one as {trial}")
-    recording, start = source.recording, entry.start or 0.0
+    recording = source.recording
+    start = entry.start or 0.0
     inputs: tuple[str, ...] = entry.inputs or ()
-    is_locked, is_fixed = entry.locked is not None, entry.volume is not None
+    is_locked = entry.locked is not None
+    is_fixed = entry.volume is not None
     if entry.scenario is not None:
         reason = "cannot be combined with a scenario, which prescribes the motion of the vane"
         refuse_first(where, (is_locked, f"locked {reason}"), (is_fixed, f"volume {reason}"))
@@ -556,7 +578,8 @@ def experiment_of(entry: ExperimentSection, context: BenchContext, reader: Recor
         start = float(recording.time[0]) if entry.start is None else entry.start
         replayed = recording.between(start, float(recording.time[-1]))
         changed = apply_overrides(context.parameter_set, entry.overrides, valve=context.valve)
-        device, known = build_device(changed, context.valve), {} if entry.locked is None else {ANGLE: entry.locked}
+        device = build_device(changed, context.valve)
+        known = {} if entry.locked is None else {ANGLE: entry.locked}
         if entry.volume is not None:
             device, known = with_fixed_volume(device, entry.volume)
         state = start_of(replayed, device, known, where)
@@ -572,7 +595,8 @@ def experiment_of(entry: ExperimentSection, context: BenchContext, reader: Recor
         scenario = replace(scenario, run=replace(scenario.run, step=entry.step))
     # The scenario of a replay has the state of the samples already.
     is_read = entry.scenario is not None and entry.initial_state in ("recording", "fitted")
-    noise, trace = entry.noise.by_channel(), source.trace
+    noise = entry.noise.by_channel()
+    trace = source.trace
     return FittedExperiment(entry.label, scenario, recording, start, compared, noise, inputs, is_read, trace)
 
 
@@ -589,8 +613,11 @@ def parameter_of(
 ) -> FitNumber:
     """Convert a table of a section to a parameter to fit [SI]; ``bench`` are estimates of procedures by path."""
     scenario = next((each.scenario for each in experiments if each.label in entry.recordings), experiments[0].scenario)
-    quantity, atmosphere = declaration_of(entry.path, scenario), scenario.device.supply.atmospheric_pressure
-    where, prior, deviation = f"parameter '{entry.path}'", entry.prior, math.inf
+    quantity = declaration_of(entry.path, scenario)
+    atmosphere = scenario.device.supply.atmospheric_pressure
+    where = f"parameter '{entry.path}'"
+    prior = entry.prior
+    deviation = math.inf
 
     def number(key: str, text: str | None) -> float:
         value = math.nan
@@ -611,5 +638,6 @@ def parameter_of(
         if estimate is None or not estimate.is_usable:
             identified = ", ".join(path for path, known in bench.items() if known.is_usable) or "none"
             raise IdentificationError(f"{where}: prior = 'bench': no procedure identifies it; identified: {identified}")
-        start, deviation = estimate.value, estimate.wider_half_width / interval_factor(estimate.confidence)
+        start = estimate.value
+        deviation = estimate.wider_half_width / interval_factor(estimate.confidence)
     return FitNumber(entry.path, start, low, high, 1.0, deviation, entry.recordings)

@@ -95,7 +95,8 @@ def prepare(
     ``numbers`` are the start values by path; ``reach`` [s] is the largest time offset that may be tried, ``fine_step``
     [s] the longest step of a finer run. Raises IdentificationError for a saturated sensor.
     """
-    recording, scenario = experiment.recording, experiment.begun
+    recording = experiment.recording
+    scenario = experiment.begun
     inside = recording.time >= experiment.start - _FITS
     # Rounding may put the first sample just before the start.
     time = np.maximum(recording.time[inside] - experiment.start, 0.0)
@@ -171,7 +172,8 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
 
     A parameter may be an array (runs,). No number goes to or from 0, which would need another program.
     """
-    base, scenario = prepared.run, with_numbers(prepared.scenario, numbers)
+    base = prepared.run
+    scenario = with_numbers(prepared.scenario, numbers)
     planned, _ = scenario.motion.motion_kind.plan(scenario)
     # The tolerance is a fraction of the supply pressure: with a fitted pressure, the error in pascals must stay.
     plant = planned.plant
@@ -191,7 +193,8 @@ def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], coun
     Runs that differ only in zeros, gains and lags of compared sensors are simulated once; runs with other zeros of
     inputs are other batches. A pressure sensor reads gauge pressure.
     """
-    measured, inputs = prepared.measured, prepared.inputs
+    measured = prepared.measured
+    inputs = prepared.inputs
     of_sensors = {f"{kind}{name}" for name in measured.names for kind in (ZERO_OF, GAIN_OF, LAG_OF)}
     running = {path: np.broadcast_to(column, (count,)) for path, column in columns.items() if path not in of_sensors}
     table = np.array([*running.values()]).reshape(-1, count)
@@ -203,7 +206,8 @@ def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], coun
     signals = {name: np.full((len(measured), len(first)), np.nan) for name in measured.names}
     for number, zeros_of_batch in enumerate(distinct.T.tolist()):
         chosen = np.flatnonzero(group.ravel() == number)
-        run, read = run_with(prepared, {path: column[chosen] for path, column in others.items()}), inputs
+        run = run_with(prepared, {path: column[chosen] for path, column in others.items()})
+        read = inputs
         if inputs is not None and zeros_of_batch:
             # Zero errors [rad], [Pa] are subtracted from recorded inputs; one sensor may measure both inlets.
             zero_of = dict(zip(followed, zeros_of_batch, strict=True))
@@ -250,7 +254,8 @@ def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], coun
         # First-order lags, exact for straight lines between samples. A lag below 0 adds what the same lag above 0 takes
         # away, so that a search can pass 0.
         for lag in np.unique(lags[lags != 0.0]).tolist():
-            runs, left = lags == lag, math.exp(-interval / abs(lag))
+            runs = lags == lag
+            left = math.exp(-interval / abs(lag))
             straight = abs(lag) / interval * (1.0 - left)
             from_start = sensed[:, runs] - sensed[:1, runs]
             behind = lfilter([1.0 - straight, straight - left], [1.0, -left], from_start, axis=0) - from_start
@@ -271,7 +276,8 @@ def _at_samples(values: Floats, prepared: PreparedExperiment, offsets: Floats) -
     fraction = np.maximum(position - before, 0.0)
     fraction[fraction < rounding] = 0.0
     runs = np.arange(len(offsets))
-    previous, following = values[before, runs], values[np.minimum(before + 1, len(values) - 1), runs]
+    previous = values[before, runs]
+    following = values[np.minimum(before + 1, len(values) - 1), runs]
     return np.asarray(previous + fraction * (following - previous))
 
 
@@ -346,7 +352,8 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     is_lagging = bool(found.conflict)
     for _, _, residuals in _residuals(found.measurements, found.models):
         # Residuals of some part of a recording have one sign, as white noise has not.
-        noise, sums = max(noise_of(residuals), 1.0e-300), np.cumsum(residuals, dtype=float)
+        noise = max(noise_of(residuals), 1.0e-300)
+        sums = np.cumsum(residuals, dtype=float)
         runs = ((np.abs(sums[width:] - sums[:-width]).max(initial=0.0), width) for width in _WINDOWS)
         is_lagging |= any(float(run) > _RUN * noise * math.sqrt(width) for run, width in runs)
     if len(steady) < len(numbers) and is_lagging:
@@ -368,13 +375,15 @@ def _fit_of(problem: TrajectoryProblem, numbers: tuple[FitNumber, ...], report: 
 
     Friction at rest is fitted as the excess over friction in motion, since it is at least as large.
     """
-    start, sought = np.array([number.start for number in numbers]), list(numbers)
+    start = np.array([number.start for number in numbers])
+    sought = list(numbers)
     unknown = {(item.path, item.recordings): item for item in numbers if not item.is_tolerance}
     for row, static in enumerate(numbers):
         dynamic = unknown.get((_DYNAMIC, static.recordings))
         if static.path != _STATIC or static.is_tolerance or math.isfinite(static.deviation) or dynamic is None:
             continue
-        low, high = max(static.low - dynamic.high, 0.0), static.high - dynamic.low
+        low = max(static.low - dynamic.high, 0.0)
+        high = static.high - dynamic.low
         if not low < high:
             least = f"low = {dynamic.low:.6g} N m of {dynamic.name}"
             raise IdentificationError(f"{static.name}: high = {static.high:.6g} N m must be above {least}")
@@ -439,15 +448,18 @@ def _result(
     conflicts = [] if fitted.conflict is None else [fitted.conflict.words]
     for number in (number for number in numbers if number.path.startswith(ZERO_OF)):
         # The zero error of a sensor stays within its limit, so a larger drift is due to the model.
-        name, limit = number.path.removeprefix(ZERO_OF), math.sqrt(3.0) * number.deviation
+        name = number.path.removeprefix(ZERO_OF)
+        limit = math.sqrt(3.0) * number.deviation
         noise = fitted.sensors.get(name, Noise(0.0))
         wander = noise.deviation * math.sqrt(max(1.0 - noise.innovation**2, 0.0))
         if wander > limit:
             drift, most = (shown_text(size, number.unit, digits=2) for size in (wander, limit))
             conflicts.append(f"the residual of {name} drifts by {drift}, but the zero of its sensor by at most {most}")
     for (measured, name, residuals), block in zip(_residuals(measurements, models), blocks, strict=True):
-        sensor, lasting = fitted.sensors[name], lasting_noise_of(residuals)
-        rms, span = float(np.sqrt(np.mean(np.square(residuals)))), float(np.ptp(measured[name]))
+        sensor = fitted.sensors[name]
+        lasting = lasting_noise_of(residuals)
+        rms = float(np.sqrt(np.mean(np.square(residuals))))
+        span = float(np.ptp(measured[name]))
         sizes = sensor.deviation, sensor.order, rms, float(np.max(np.abs(residuals))), span
         channels.append(ChannelFit(measured.label, name, measured.unit(name), *sizes))
         if rms > _BURST * lasting and rms > _FELT * span:
@@ -455,7 +467,8 @@ def _result(
             conflicts.append(f"the residual of {name} of {measured.label} is {times}")
         left_out = [row - block.rows.start for row in fitted.outliers if block.rows.start <= row < block.rows.stop]
         if left_out:
-            count, first = count_of(len(left_out), "outlier"), measured.time[left_out[0]]
+            count = count_of(len(left_out), "outlier")
+            first = measured.time[left_out[0]]
             outliers.append(f"experiment '{measured.label}': {count} of {name} left out, the first at {first:.6g} s")
     conflict = next(iter(conflicts), "")
     # Tolerances are marginalised: their rows are left out, their share of the variance stays.
@@ -489,7 +502,8 @@ def _result(
         faults.append(f"the recordings favour {' and '.join(wanted)}, where every run fails")
     elif not fitted.has_converged:
         faults.append(f"the search stopped after {fitted.evaluations} runs before it converged")
-    recordings, tolerances = count_of(len(runs), "recording"), count_of(len(known), "tolerance")
+    recordings = count_of(len(runs), "recording")
+    tolerances = count_of(len(known), "tolerance")
     return TrajectoryFit(
         procedure="trajectory",
         summary=f"{count_of(len(rows), 'number')} fitted to {recordings}, {tolerances}",
@@ -538,10 +552,12 @@ def expected_information(
     sensors = fit.fit.sensors
     # Another experiment says nothing of a number of one recording, such as its trigger.
     common = [index for index, number in enumerate(found.numbers) if not number.recordings]
-    numbers, point = tuple(replace(found.numbers[index], base="") for index in common), found.values[common]
+    numbers = tuple(replace(found.numbers[index], base="") for index in common)
+    point = found.values[common]
     unknowns = [index for index, number in enumerate(found.numbers) if not number.is_tolerance]
     # In units of today's standard errors, for pascals and radians differ by many powers of ten.
-    errors, rows = np.sqrt(np.diag(found.covariance)), np.ix_(unknowns, unknowns)
+    errors = np.sqrt(np.diag(found.covariance))
+    rows = np.ix_(unknowns, unknowns)
     before = found.covariance / np.outer(errors, errors)
     for label, scenario, given, interval in candidates:
         noise = dict(given) or {name: model.deviation for name, model in sensors.items()}
@@ -564,7 +580,8 @@ def expected_information(
         for block, (name, deviation) in zip(np.split(slopes, len(noise)), noise.items(), strict=True):
             sensor = sensors.get(name)
             blocks.append(whiten(block, replace(sensor, deviation=deviation) if sensor else Noise(deviation)))
-        jacobian, information = np.concatenate(blocks) * errors[common], np.linalg.inv(before)
+        jacobian = np.concatenate(blocks) * errors[common]
+        information = np.linalg.inv(before)
         information[np.ix_(common, common)] += jacobian.T @ jacobian
         after = np.linalg.inv(information)
         gain = 0.5 * float(np.linalg.slogdet(before[rows])[1] - np.linalg.slogdet(after[rows])[1])

@@ -60,7 +60,8 @@ def findings_of(audited: ParameterSet, parent: ParameterSet | None = None) -> li
     for question in QUESTIONS:
         with contextlib.suppress(ParameterError):
             findings.extend(question(evidence))
-    changed, ids = overridden_paths(audited), {finding.id for finding in findings}
+    changed = overridden_paths(audited)
+    ids = {finding.id for finding in findings}
     judged = []
     for finding in findings:
         reason = audited.accepted.get(finding.id, "")

@@ -52,9 +52,12 @@ def inertia(evidence: Evidence) -> Iterator[AuditFinding]:
 
     Equations (1) and (10). The decay is reported as a ratio or as its inverse; an inverse in 1/s is the ratio itself.
     """
-    of_inertia, decay_path, decay = evidence.magnitude(_INERTIA), _DECAY, evidence.magnitude(_DECAY)
+    of_inertia = evidence.magnitude(_INERTIA)
+    decay_path = _DECAY
+    decay = evidence.magnitude(_DECAY)
     if decay is None and (inverse := evidence.magnitude(_DECAY_INVERSE)) is not None:
-        decay_path, decay = _DECAY_INVERSE, inverse
+        decay_path = _DECAY_INVERSE
+        decay = inverse
         with contextlib.suppress(UnitError):
             to_si(1.0, evidence.parameter_set.numbers[_DECAY_INVERSE].unit, "s")
             decay = ReportedRange(1.0, 1.0).over(inverse)
@@ -268,7 +271,8 @@ def filling(evidence: Evidence) -> Iterator[AuditFinding]:
 def vacuum(evidence: Evidence) -> Iterator[AuditFinding]:
     """Note each supply below the atmosphere with the depth of the vacuum; a warning for an absolute unit."""
     for chamber, path in enumerate(_SUPPLIES[:2], 1):
-        pressure, atmosphere = evidence.number(path), evidence.atmosphere()
+        pressure = evidence.number(path)
+        atmosphere = evidence.atmosphere()
         if pressure is not None and 0.0 < pressure < atmosphere:
             depth = atmosphere - pressure
             is_absolute = evidence.parameter_set.numbers[path].unit.endswith("_a")
@@ -303,13 +307,15 @@ def torque_ceiling(evidence: Evidence) -> Iterator[AuditFinding]:
 
     Equation (2). Of an actuator other than a vane it is the most and the least up and down between the stops.
     """
-    shown, constant = evidence.parameter_set.shown, evidence.number(TORQUE_CONSTANT_PATH)
+    shown = evidence.parameter_set.shown
+    constant = evidence.number(TORQUE_CONSTANT_PATH)
     supplies = {path: value for path in _SUPPLIES if (value := evidence.number(path)) is not None}
     ceilings = dict[str, float]()
     why = []
     if supplies and evidence.parameter_set.actuator_kind != VANE:
         device = build_device(evidence.parameter_set)
-        lowest, highest = float(device.actuator.angle_min), float(device.actuator.angle_max)
+        lowest = float(device.actuator.angle_min)
+        highest = float(device.actuator.angle_max)
         angles = [lowest + (highest - lowest) * number / _ANGLES for number in range(_ANGLES + 1)]
         downward, upward = zip(*(torque_reach(device, angle) for angle in angles), strict=True)
         at = []
@@ -322,13 +328,19 @@ def torque_ceiling(evidence: Evidence) -> Iterator[AuditFinding]:
     if not ceilings:
         return
     severity: Severity = "note"
-    needed, ceiling, demand, static = 0.0, max(ceilings.values()), evidence.number(_DEMAND), evidence.number(_STATIC)
+    needed = 0.0
+    ceiling = max(ceilings.values())
+    demand = evidence.number(_DEMAND)
+    static = evidence.number(_STATIC)
     if demand is not None and demand > ceiling:
-        severity, needed = "warning", demand
+        severity = "warning"
+        needed = demand
     if static is not None and static >= ceiling:
-        severity, needed = "error", static
+        severity = "error"
+        needed = static
     with shown_in(shown):
-        torque_unit, unit = shown_unit("N m"), shown_unit("Pa_d").removesuffix("_d")
+        torque_unit = shown_unit("N m")
+        unit = shown_unit("Pa_d").removesuffix("_d")
         # A form that keeps zeros makes "550." of 550.
         most = f"{shown_value(ceiling, 'N m'):#.3g}".removesuffix(".")
         if constant:
@@ -374,11 +386,14 @@ def published_torque(evidence: Evidence) -> Iterator[AuditFinding]:
 def while_walking(evidence: Evidence, valve: str) -> Iterator[AuditFinding]:
     """Compare the time in which a valve fills chamber 1 at toe-off for the torque of walking with a push-off."""
     paths = [f"valves.{valve}.area", f"valves.{valve}.discharge_coefficient", "reported.walking_torque_pressure"]
-    gas, volume, atmosphere = evidence.gas(), evidence.chamber_1_volume(_TOE_OFF), evidence.atmosphere()
+    gas = evidence.gas()
+    volume = evidence.chamber_1_volume(_TOE_OFF)
+    atmosphere = evidence.atmosphere()
     area, coefficient, supply, torque, constant = evidence.positive(
         *paths, "reported.walking_torque", TORQUE_CONSTANT_PATH
     )
-    k, product = gas.heat_capacity_ratio, gas.specific_gas_constant * gas.temperature
+    k = gas.heat_capacity_ratio
+    product = gas.specific_gas_constant * gas.temperature
     choked = area_conductance(area, coefficient, k, gas.specific_gas_constant, gas.temperature) * supply
     target = atmosphere + _REACHED * min(pressure_for_torque(torque, constant), supply - atmosphere)
     interval = (target - atmosphere) / _INTERVALS

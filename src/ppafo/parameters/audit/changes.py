@@ -32,7 +32,8 @@ def changes(parameter_set: ParameterSet, parent: ParameterSet) -> list[ValueChan
 
     Numbers are compared in SI: the same value in another unit is no change. Sources and notes are not compared.
     """
-    parameter_set, parent = with_followers(parameter_set), with_followers(parent)
+    parameter_set = with_followers(parameter_set)
+    parent = with_followers(parent)
     kinds, old_kinds = (
         {
             "default_valve": each.default_valve,
@@ -47,9 +48,11 @@ def changes(parameter_set: ParameterSet, parent: ParameterSet) -> list[ValueChan
         for path in dict.fromkeys((*kinds, *old_kinds))
         if kinds.get(path) != old_kinds.get(path)
     ]
-    after, before = parameter_set.entries(), parent.entries()
+    after = parameter_set.entries()
+    before = parent.entries()
     for path in dict.fromkeys((*after, *before)):
-        new, old = after.get(path), before.get(path)
+        new = after.get(path)
+        old = before.get(path)
         if new is None and path.startswith("reported."):
             # A number reported of one device is no property that another could lack.
             continue
@@ -60,7 +63,8 @@ def changes(parameter_set: ParameterSet, parent: ParameterSet) -> list[ValueChan
 
 
 def _is_same(path: str, parameter_set: ParameterSet, parent: ParameterSet) -> bool:
-    new, old = parameter_set.entries()[path], parent.entries()[path]
+    new = parameter_set.entries()[path]
+    old = parent.entries()[path]
     if not isinstance(new, Entry) or not isinstance(old, Entry):
         return new.value == old.value
     if (new.value, new.unit) == (old.value, old.unit):

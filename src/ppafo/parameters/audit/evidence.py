@@ -136,7 +136,8 @@ class Evidence:
 
     def magnitude(self, path: str) -> ReportedRange | None:
         """Return the interval of the magnitude of a parameter [SI]: its stated uncertainty, else its rounding."""
-        value, entry = self.number(path), self.parameter_set.numbers.get(path)
+        value = self.number(path)
+        entry = self.parameter_set.numbers.get(path)
         if value is None or entry is None or entry.value == 0.0:
             return None
         # Below 1: the digits of "2" leave open 1.5 to 2.5, and never 0 or another sign.
@@ -146,10 +147,12 @@ class Evidence:
 
     def in_set_unit(self, path: str, value: float) -> str:
         """Format an SI value in the unit of a parameter in the set, for example ``84 g m^2``."""
-        entry, quantity = self.parameter_set.numbers.get(path), self.declared[path]
+        entry = self.parameter_set.numbers.get(path)
+        quantity = self.declared[path]
         with contextlib.suppress(UnitError):
             if entry is not None:
-                room, given = atmospheric_pressure(self.parameter_set), entry.unit
+                room = atmospheric_pressure(self.parameter_set)
+                given = entry.unit
                 number = in_first_unit(quantity, lambda unit: from_si(value, given, unit, room))
                 return f"{number:.4g} {given}".rstrip()
         return f"{value:.4g} {quantity.unit.removesuffix('_a')}".rstrip()
@@ -164,7 +167,8 @@ class Evidence:
         severity: Severity = "error",
     ) -> AuditFinding:
         """Return a finding on the values at ``paths``, with number and SI unit of each side that it compares."""
-        numbers, texts = self.parameter_set.numbers, self.parameter_set.texts
+        numbers = self.parameter_set.numbers
+        texts = self.parameter_set.texts
         values = [NamedValue(p, numbers[p].value, numbers[p].unit, numbers[p].origin) for p in paths if p in numbers]
         values += [NamedValue(p, str(texts[p].value), "", texts[p].origin) for p in paths if p in texts]
         compared = tuple(ComparedNumber(label, value, unit) for label, (value, unit) in sides.items())

@@ -45,8 +45,10 @@ class _OpenValve(NamedTuple):
 
 def _open_valve(evidence: Evidence, valve: str, upstream: float, downstream: float) -> _OpenValve:
     """Return a valve between two pressures [Pa absolute]. Raises ParameterError without a gas, one form or a flow."""
-    gas, form = evidence.gas(), orifice_form(evidence.parameter_set, f"valves.{valve}")
-    paths, is_area = tuple(f"valves.{valve}.{quantity.name}" for quantity in form), form is AREA_FORM
+    gas = evidence.gas()
+    form = orifice_form(evidence.parameter_set, f"valves.{valve}")
+    paths = tuple(f"valves.{valve}.{quantity.name}" for quantity in form)
+    is_area = form is AREA_FORM
     numbers = evidence.positive(*paths)
     if not upstream > downstream > 0.0 or not (is_area or numbers[1] < 1.0):
         raise ParameterError(f"valve '{valve}' passes nothing")
@@ -77,7 +79,8 @@ def open_flow(evidence: Evidence, valve: str) -> Iterator[AuditFinding]:
     """Note the flow of a valve with the gas of the set."""
     (supply,), atmosphere = evidence.numbers("supply.pressure"), evidence.atmosphere()
     opened = _open_valve(evidence, valve, max(supply, atmosphere), min(supply, atmosphere))
-    gas, way = evidence.gas().species, "atmosphere to vacuum" if supply < atmosphere else "supply to atmosphere"
+    gas = evidence.gas().species
+    way = "atmosphere to vacuum" if supply < atmosphere else "supply to atmosphere"
     is_converted = not opened.is_area and gas != "air"
     yield evidence.finding(
         f"open-flow-of-{valve}",
@@ -104,9 +107,11 @@ def flow(evidence: Evidence) -> Iterator[AuditFinding]:
                 possible = possible.times(evidence.magnitude(path) or ReportedRange(1.0, 1.0))
             per_size = opened.flow / math.prod(sizes)
             needed = reported / per_size
-            kind, formula = "sonic conductance", "flow of the sonic conductance"
+            kind = "sonic conductance"
+            formula = "flow of the sonic conductance"
             if opened.is_area:
-                kind, formula = "Cd A", "Cd A C1 P"
+                kind = "Cd A"
+                formula = "Cd A C1 P"
                 measured[valve] = sizes[0], sizes[1], needed
             sides = {
                 "reported flow": (reported, "kg/s"),
@@ -123,7 +128,8 @@ def flow(evidence: Evidence) -> Iterator[AuditFinding]:
                 yield evidence.finding(f"flow-of-{valve}", title, [*opened.paths[: len(sizes)], *paths], sides)
     for other, (other_area, other_coefficient, other_size) in [*measured.items()][1:]:
         first, (area, coefficient, size) = next(iter(measured.items()))
-        area_ratio, flow_ratio = area / other_area, size / other_size
+        area_ratio = area / other_area
+        flow_ratio = size / other_size
         if coefficient == other_coefficient and abs(area_ratio / flow_ratio - 1.0) >= 2.0 * _MODEL:
             parts = "valves.{}.area", "valves.{}.discharge_coefficient", "reported.valves.{}.mass_flow"
             yield evidence.finding(

@@ -128,7 +128,8 @@ def unusual(evidence: Evidence) -> Iterator[AuditFinding]:
             for path, text in _unusual(build_device(evidence.parameter_set, valve)):
                 section = path.replace(_CHOSEN, f"valves.{valve}")
                 paths = [name for name in evidence.parameter_set.numbers if name.startswith(section)]
-                why, name = f"Usual range: {USUAL[path].source}", f"proportion-of-{identifier_of(section)}"
+                why = f"Usual range: {USUAL[path].source}"
+                name = f"proportion-of-{identifier_of(section)}"
                 findings[name] = evidence.finding(name, text, paths, why=why, severity="warning")
     yield from findings.values()
 
@@ -144,8 +145,10 @@ def _unusual(device: Device) -> Iterator[tuple[str, str]]:
 
 def proportions(device: Device) -> Iterator[tuple[str, float]]:
     """Yield path and value of the proportions of a device that it has, for a single run."""
-    plant, torque = plant_parameters(device), static_torque(device)
-    room, turn = plant.atmospheric_pressure, plant.angle_max - plant.angle_min
+    plant = plant_parameters(device)
+    torque = static_torque(device)
+    room = plant.atmospheric_pressure
+    turn = plant.angle_max - plant.angle_min
     yield ATMOSPHERE_PATH, room / STANDARD_ATMOSPHERE
     for path, pressure in ((PRESSURE_PATH, plant.supply_pressure), (SECOND_PRESSURE_PATH, plant.dorsiflexion_pressure)):
         # A vented chamber has no supply.

@@ -88,7 +88,8 @@ def contradictions(evidence: Evidence) -> Iterator[AuditFinding]:
             device = read_device(parameter_set, valve, {})
             found |= {line: paths for paths, line in contradictions_of_set(parameter_set, device)}
     for line, paths in found.items():
-        title, why = "contradictory values prevent a run", f"No run is possible: {line}."
+        title = "contradictory values prevent a run"
+        why = f"No run is possible: {line}."
         yield evidence.finding(identifier_of(paths[0]), title, paths, why=why)
 
 
@@ -120,7 +121,8 @@ def dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
     """Name each value in the unit of its reciprocal, and all other values whose unit does not fit their equation."""
     foreign = {}
     for path, entry in evidence.parameter_set.numbers.items():
-        quantity, value = evidence.declared[path], 0.0
+        quantity = evidence.declared[path]
+        value = 0.0
         inverse = f"1/({quantity.unit})" if " " in quantity.unit or "/" in quantity.unit else f"1/{quantity.unit}"
         try:
             entry_in_si(entry, quantity, evidence.atmosphere())
@@ -149,7 +151,8 @@ def dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
 def ranges(evidence: Evidence) -> Iterator[AuditFinding]:
     """Name each value outside the limits of its declaration, which any device keeps."""
     for path in evidence.parameter_set.numbers:
-        quantity, value = evidence.declared[path], number_in_si(evidence.parameter_set, path)
+        quantity = evidence.declared[path]
+        value = number_in_si(evidence.parameter_set, path)
         if value is not None and not is_within(value, quantity):
             ends = {"in the set": value, "lower limit": quantity.minimum, "upper limit": quantity.maximum}
             yield evidence.finding(
@@ -169,8 +172,10 @@ def gas_data(evidence: Evidence) -> Iterator[AuditFinding]:
         why = f"Available: {', '.join(SPECIES)}."
         yield evidence.finding("gas-species", f"no data for the gas '{name}'", ["gas.species"], why=why)
     for key in ("molar_mass", "heat_capacity_ratio") if species else ():
-        path, expected = f"gas.{key}", getattr(species, key)
-        value, unit = evidence.number(path), evidence.declared[path].unit
+        path = f"gas.{key}"
+        expected = getattr(species, key)
+        value = evidence.number(path)
+        unit = evidence.declared[path].unit
         if species and value is not None and abs(value / expected - 1.0) > _OF_THE_GAS:
             yield evidence.finding(
                 identifier_of(path),
@@ -187,7 +192,8 @@ def flow_constants(evidence: Evidence) -> Iterator[AuditFinding]:
     The paper states the critical ratio as upstream over downstream.
     """
     gas = evidence.gas()
-    k, properties = gas.heat_capacity_ratio, (gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature)
+    k = gas.heat_capacity_ratio
+    properties = (gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature)
     expected = {
         _C1: choked_flow_constant(*properties),
         "reported.subsonic_flow_constant": subsonic_flow_constant(*properties),
@@ -204,11 +210,13 @@ def flow_constants(evidence: Evidence) -> Iterator[AuditFinding]:
                 {"reported": (reported, quantity.unit), "from the gas data": (value, quantity.unit)},
                 severity="note" if agrees else "error",
             )
-    formula, correct = evidence.text(_EXPONENT), (k + 1.0) / (k - 1.0)
+    formula = evidence.text(_EXPONENT)
+    correct = (k + 1.0) / (k - 1.0)
     exponent = evaluate(formula, k)
     if not formula or (exponent is not None and math.isclose(exponent, correct, rel_tol=1e-9)):
         return
-    title, paths = "the reported exponent in C1 is not the exponent of choked flow", [_EXPONENT, _C1, *GAS_PATHS]
+    title = "the reported exponent in C1 is not the exponent of choked flow"
+    paths = [_EXPONENT, _C1, *GAS_PATHS]
     if exponent is None:
         why = f"The formula '{formula}' is not an arithmetic expression in k; the correct exponent is (k + 1)/(k - 1)."
         yield evidence.finding("choked-flow-exponent", title, paths, why=why, severity="warning")

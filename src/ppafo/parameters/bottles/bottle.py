@@ -148,7 +148,8 @@ def _fixed(value: Any) -> Any:
 
 def check_temperature(path: str, temperature: float, fluid: Fluid, file: str) -> None:
     """Raise ParameterError for a temperature [K] that the property table of the fluid does not cover."""
-    coldest, hottest = fluid.table.temperatures[0], fluid.table.temperatures[-1]
+    coldest = fluid.table.temperatures[0]
+    hottest = fluid.table.temperatures[-1]
     if not coldest < temperature <= hottest:
         raise ParameterError(
             f"{file}: {path} = {temperature:g} K: must be above {coldest:g} K and at most {hottest:g} K, the range "
@@ -247,13 +248,15 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
         for other in other_forms(path, FILLS):
             entries.pop(other, None)
         entries[path] = Entry(value=value, unit=unit, origin="assumed", source=SOURCE)
-    bottle, changed = _build(parsed, entries, file), changed_text(map(str, changes.values()))
+    bottle = _build(parsed, entries, file)
+    changed = changed_text(map(str, changes.values()))
     return replace(bottle, title=f"{bottle.title} ({changed})") if changes else bottle
 
 
 def _read(name_or_path: str | Path) -> tuple[dict[str, Any], dict[str, Entry], str]:
     """Read and check a bottle file. Returns its document, its numbers by dotted path, and its label in messages."""
-    file, content = label(str(name_or_path)), FILE.read(name_or_path)
+    file = label(str(name_or_path))
+    content = FILE.read(name_or_path)
     document = FILE.parse(content, file)
     check_keys(document, declared(document), file, ParameterError, content)
     tables = {path: table for path in PATHS if (table := value_at(document, path)) is not None}

@@ -56,7 +56,8 @@ class MeteredRuns:
     """Results of all runs so far: arrays that batches fill by column; nan for runs not yet made."""
 
     def __init__(self, runs: int, request: OutputRequest, count: Count = report_nothing) -> None:
-        self.request, self._count = request, count
+        self.request = request
+        self._count = count
         self.failure_time = np.full(runs, np.nan)
         self.is_completed = np.zeros(runs, dtype=bool)
         self.too_many_parts = np.zeros(runs, dtype=bool)
@@ -75,7 +76,8 @@ class MeteredRuns:
 
     def _run(self, task: "_MeteredBatch", threads: int | None, effort: Effort) -> None:
         """Run a batch and store the results of its runs at their indices in the ensemble."""
-        batch, runs_of_batch = task.batch, task.members.size
+        batch = task.batch
+        runs_of_batch = task.members.size
         states = np.empty_like(batch.states)
         metrics = {name: np.full(runs_of_batch, np.nan) for name, kind in task.metrics.items() if kind.traced}
 
@@ -98,7 +100,8 @@ class MeteredRuns:
                 self._count(1)
         from_meters = [name for name in task.metrics if name not in metrics]
         metrics |= task.read(from_meters, states, slice(None), None)
-        members, result = task.members, group_of("result", task.batch.program.state_rows(), states)
+        members = task.members
+        result = group_of("result", task.batch.program.state_rows(), states)
         # As for a single run: valid throughout, and finite at the end. The rows of meters do not matter.
         is_completed = (result.failure_time >= NEVER_FAILED) & np.isfinite(states[: task.physical]).all(axis=0)
         # If the time of failure is unknown, it is the time of the last sample.
@@ -136,7 +139,8 @@ class _MeteredBatch:
         program = self.batch.program
         course = group_of("course", program.state_rows(), states) if program.follows_reference else ()
         traces = {} if record is None else {name: record[:, row] for row, name in enumerate(program.traced)}
-        groups, interval = program.state_rows(), self.interval[runs]
+        groups = program.state_rows()
+        interval = self.interval[runs]
         # The final state of each meter: arrays (runs,) in meter units.
         meters = {kind.name: group_of(group, groups, states) for group, kind in program.meter_groups.items()}
         readings = Readings(meters=meters, course=course, interval=interval, samples=self.samples, traces=traces)

@@ -87,7 +87,8 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
     if pair is not None:
         raise ScenarioError(f"{base.name}: '{pair[0]}' and '{pair[1]}' cannot both vary: {either(pair[0])}")
     # An adiabatic scenario need not say its area, and runs that take up heat would go on as if they had none.
-    gas, heat_varies = base.gas_model, "gas_model.heat_transfer_coefficient" in values
+    gas = base.gas_model
+    heat_varies = "gas_model.heat_transfer_coefficient" in values
     if heat_varies and WALL_AREA not in values and gas is not None and gas.wall_area_per_volume == 0.0:
         raise ScenarioError(f"{base.name}: the heat transfer varies, but '{WALL_AREA}' is 0; give the wall area")
     (shape,) = set(shapes.values())
@@ -150,7 +151,9 @@ class _ValidRuns:
         for index in np.flatnonzero(bad):
             self.reasons[int(self.members[index])] = line(int(index))
         valid = self.subset(np.flatnonzero(~bad))
-        self.members, self.columns, self._scenario = valid.members, valid.columns, None
+        self.members = valid.members
+        self.columns = valid.columns
+        self._scenario = None
 
 
 def screen_columns(columns: ScenarioColumns) -> _ValidRuns:
@@ -179,7 +182,8 @@ def screen_columns(columns: ScenarioColumns) -> _ValidRuns:
 
 
 def _out_of_range(columns: ScenarioColumns, path: str) -> Problem:
-    values, quantity = columns.values[path], columns.declared[path]
+    values = columns.values[path]
+    quantity = columns.declared[path]
     unit = quantity.unit
 
     def line(run: int) -> str:

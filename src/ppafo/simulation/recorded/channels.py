@@ -78,7 +78,8 @@ def sample_period(time: Floats) -> float:
 
 def between_stops(angles: Floats, device: Device, file: str) -> Floats:
     """Return angles [rad], limited to the stops; DataError, prefixed with ``file``, for angles far beyond a stop."""
-    lowest, highest = device.actuator.angle_min, device.actuator.angle_max
+    lowest = device.actuator.angle_min
+    highest = device.actuator.angle_max
     margin = _BEYOND_STOPS * (highest - lowest)
     worst = angles[int(np.argmax(np.maximum(lowest - angles, angles - highest)))]
     if not lowest - margin <= worst <= highest + margin:

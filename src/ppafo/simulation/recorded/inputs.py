@@ -57,9 +57,12 @@ def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
     A run that follows the angle must come from ``with_prescribed_angle``. Raises DataError for angles far beyond the
     stops.
     """
-    command, earlier, recording = None, None, inputs.recording
+    command = None
+    earlier = None
+    recording = inputs.recording
     if COMMAND in inputs.names:
-        command, begin = _values_at_steps(inputs, COMMAND, run), float(recording.time[0])
+        command = _values_at_steps(inputs, COMMAND, run)
+        begin = float(recording.time[0])
         # A recording that begins in motion under a command begins after it, and one at rest begins with it: the vane
         # cannot have been set in motion at once; a pressure may.
         first = recording[COMMAND][:1]

@@ -56,14 +56,17 @@ def motion_at(recording: Recording, start: float) -> tuple[float, float, float] 
     if ANGLE not in recording:
         return None
     inside = recording.time >= start - _FITS
-    time, angles, noise = recording.time[inside] - start, recording[ANGLE][inside], read_error(recording, ANGLE)
+    time = recording.time[inside] - start
+    angles = recording[ANGLE][inside]
+    noise = read_error(recording, ANGLE)
     found = None
     for count in (count for count in _WINDOWS if count <= time.size):
         coefficients, covariance = np.polyfit(time[:count], angles[:count], 3, cov="unscaled")
         scatter = float(np.std(angles[:count] - np.polyval(coefficients, time[:count])))
         if found is not None and scatter > _FOLLOWED * noise:
             break
-        angle, velocity = float(coefficients[3]), float(coefficients[2])
+        angle = float(coefficients[3])
+        velocity = float(coefficients[2])
         found = angle, velocity, _SURE * max(noise, scatter) * math.sqrt(float(covariance[2, 2]))
     return found if found is not None and abs(found[1]) > _LEAST_VELOCITY + _SEEN * found[2] else None
 
@@ -77,7 +80,8 @@ def read_error(recording: Recording, name: str) -> float:
 
 def samples_at_rest(recording: Recording) -> int:
     """Return the number of samples before the first command, at most 50 ms; 1 if the valve is open at the start."""
-    command, time = recording[COMMAND], recording.time
+    command = recording[COMMAND]
+    time = recording.time
     if command[0] != 0.0:
         return 1
     quiet = command.size if not command.any() else int(np.argmax(command != 0.0))
@@ -93,7 +97,8 @@ def start_of(recording: Recording, device: Device, known: Mapping[str, float], f
     motion = None if is_told else motion_at(recording, float(recording.time[0]))
     if motion is not None:
         known = {ANGLE: motion[0], "angular_velocity": motion[1], **known}
-    count, values = samples_at_rest(recording), dict(known)
+    count = samples_at_rest(recording)
+    values = dict(known)
     if device.actuator.has_one_chamber and "pressure_2" not in recording:
         # No recorded channel depends on the dead volume behind the other port.
         values.setdefault("pressure_2", device.supply.atmospheric_pressure)
@@ -103,7 +108,8 @@ def start_of(recording: Recording, device: Device, known: Mapping[str, float], f
         elif name != "angular_velocity" and name not in values:
             raise DataError(f"{file}: there is no channel '{name}' for the initial state")
     angle = float(between_stops(np.array([values[ANGLE]]), device, file)[0])
-    velocity, error = values.get("angular_velocity", 0.0), 0.0 if motion is None else motion[2]
+    velocity = values.get("angular_velocity", 0.0)
+    error = 0.0 if motion is None else motion[2]
     return ReplayStart(angle, velocity, values["pressure_1"], values["pressure_2"], error)
 
 
@@ -115,13 +121,15 @@ def value_at_rest(time: Floats, values: Floats, at_end: bool = False) -> float:
     """
     while values.size >= _FEWEST_ON_LINE:
         fraction = (time - (time[-1] if at_end else time[0])) / (time[-1] - time[0])
-        line, parabola = np.vander(fraction, 2), np.vander(fraction, 3)
+        line = np.vander(fraction, 2)
+        parabola = np.vander(fraction, 3)
         if not _is_seen(line, values):
             return float(np.mean(values))
         if not _is_seen(parabola, values):
             return float(np.linalg.lstsq(line, values)[0][-1])
         nearer_half = slice(values.size // 2, None) if at_end else slice(None, values.size // 2)
-        time, values = time[nearer_half], values[nearer_half]
+        time = time[nearer_half]
+        values = values[nearer_half]
     return float(values[-1 if at_end else 0])
 
 

@@ -53,7 +53,8 @@ def level_text(unit: str, number: float) -> str:
     """Value with its display unit, from a number in an SI unit; pressures as gauge pressures, or as differences."""
     value, shown = metric_level(float(number), unit)
     if shown == "s" and abs(value) < _SHORT:
-        value, shown = 1.0e3 * value, "ms"
+        value = 1.0e3 * value
+        shown = "ms"
     return f"{without_exponent(value, '.3g')} {shown}".rstrip()
 
 
@@ -134,17 +135,20 @@ class Case:
         """True for each sample of the recording with a fully open valve."""
         recording = self.recording
         if VALVES[self.device.valve.kind].regulation is None:
-            command, settings = np.abs(recording["command"]), self.scenario.controller.settings
+            command = np.abs(recording["command"])
+            settings = self.scenario.controller.settings
             # An on/off law may open its valves by less on purpose.
             most = _FULLY_OPEN * min(settings.get("opening", 1.0), 1.0)
             return np.asarray((command >= most) & (command <= 1.0 + SHUT))
         # A regulator is where a chamber gains or loses as much gas as it passes when fully open.
-        plant, full = plant_parameters(self.device), np.zeros(recording.time.shape, dtype=np.bool_)
+        plant = plant_parameters(self.device)
+        full = np.zeros(recording.time.shape, dtype=np.bool_)
         for number, source in ((1, plant.supply_pressure), (2, plant.dorsiflexion_pressure)):
             # An actuator with one chamber has no second one.
             if f"mass_{number}" not in recording:
                 continue
-            pressure, gain = recording[f"pressure_{number}"], np.gradient(recording[f"mass_{number}"], recording.time)
+            pressure = recording[f"pressure_{number}"]
+            gain = np.gradient(recording[f"mass_{number}"], recording.time)
             for node, way in ((source, 1.0), (plant.atmospheric_pressure, -1.0)):
                 flow = over_samples(orifice_flow, node, pressure, plant.valve_conductance, 1.0, plant.valve_curve)[0]
                 most = np.maximum(way * flow, _HARDLY * np.max(way * flow))

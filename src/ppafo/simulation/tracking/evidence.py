@@ -82,7 +82,8 @@ def evidence_in(case: Case) -> Iterator[Evidence]:
         yield (LARGER_VALVE,), f"the valve is fully open for {100.0 * case.open_share:.0f} % of the time"
     delays = delays_of(scenario)
     if path := most_of(delays):
-        total, rate = level_text("s", math.fsum(delays.values())), 1.0 / scenario.controller.period
+        total = level_text("s", math.fsum(delays.values()))
+        rate = 1.0 / scenario.controller.period
         stated = f"`{RATE_PATH} = {rate:.4g} Hz`" if path == RATE_PATH else stated_number(scenario, path)
         yield (ideal_words(scenario, path),), f"{stated} is most of the loop's delay of {total}"
 
@@ -95,7 +96,8 @@ def delays_of(scenario: Scenario) -> dict[str, float]:
     """
     declared = declared_numbers(scenario)
     number = {path: number_at(scenario, path) for path in _DELAYS if path in declared}
-    spool, slew = number.pop(_SPOOL, 0.0), number.pop(_SLEW, 0.0)
+    spool = number.pop(_SPOOL, 0.0)
+    slew = number.pop(_SLEW, 0.0)
     damping = number.pop(_DAMPING, 0.0)
     delays = {path: lag_of_sensor(value) if path.endswith("bandwidth") else value for path, value in number.items()}
     delays[RATE_PATH] = SAMPLES_LATE * scenario.controller.period
@@ -147,10 +149,13 @@ class TorqueReach(NamedTuple):
 
 def torque_peaks(case: Case) -> tuple[TorqueReach, TorqueReach]:
     """Highest and lowest wanted torque with the reach there; a reference with a period counts with its own peaks."""
-    reference, angle, device = case.reference, case.channel("angle"), case.device
+    reference = case.reference
+    angle = case.channel("angle")
+    device = case.device
     has_period = math.isfinite(case.settled.reference_periods)
     lowest, highest = profile_bounds(case.scenario.reference) if has_period else (reference.min(), reference.max())
-    top, bottom = float(angle[int(np.argmax(reference))]), float(angle[int(np.argmin(reference))])
+    top = float(angle[int(np.argmax(reference))])
+    bottom = float(angle[int(np.argmin(reference))])
     return (
         TorqueReach(float(highest), torque_reach(device, top)[1], top, upwards=True),
         TorqueReach(float(lowest), torque_reach(device, bottom)[0], bottom, upwards=False),
@@ -175,7 +180,8 @@ def _reach_text(reach: float, upwards: bool) -> str:
 
 def torque_beyond_reach(case: Case) -> str:
     """Clause: the wanted torque exceeds the actuator's torque from its supplies at that angle; "" if it does not."""
-    scenario, device = case.scenario, case.device
+    scenario = case.scenario
+    device = case.device
     peaks = torque_peaks(case) if scenario.controlled == TORQUE and not case.oscillates else ()
     worst = max(peaks, key=lambda peak: peak.lacking, default=None)
     if worst is None or worst.lacking <= 0.0:
@@ -198,7 +204,9 @@ def _load_at(case: Case, angle: float) -> float | None:
 
 def _load_beyond_reach(case: Case) -> str:
     """Clause: the load on a free joint exceeds the actuator's torque at the wanted angle; "" if it does not."""
-    scenario, device, wanted = case.scenario, case.device, float(np.mean(case.reference))
+    scenario = case.scenario
+    device = case.device
+    wanted = float(np.mean(case.reference))
     if (load := _load_at(case, wanted)) is None:
         return ""
     lowest, highest = torque_reach(device, wanted)
@@ -235,21 +243,24 @@ def _flung_at_start(case: Case) -> str:
     deviation = float(np.max(((reference - angle) * np.sign(lacking))[reference == reference[0]]))
     if abs(lacking) <= float(device.friction.static_torque) or deviation <= _FLUNG * case.settled.wanted_change:
         return ""
-    carried, needed = level_text("N m", load - lacking), level_text("N m", load)
+    carried = level_text("N m", load - lacking)
+    needed = level_text("N m", load)
     away = f"the joint moves away by {change_text(ANGLE, deviation)} before the chambers are filled"
     return f"at the start the chambers give {carried} for a load of {needed}: {away}"
 
 
 def _step_of_valves(case: Case) -> str:
     """Clause: on/off valves change the controlled quantity during their dead time, however little is requested."""
-    scenario, law = case.scenario, case.law
+    scenario = case.scenario
+    law = case.law
     if law is None and case.opens_fully_alone:
         # Valves that a Python object opens fully alone act as under the shipped on/off law.
         law = CONTROLLERS["on_off"]
     if law is None or not (case.only_switches or case.law is None):
         return ""
     # Step R theta at the mean angle, in the dead time theta.
-    loop, angle = loop_of(scenario, law), float(np.mean(case.channel("angle")))
+    loop = loop_of(scenario, law)
+    angle = float(np.mean(case.channel("angle")))
     parts = LoopParts(scenario.device, scenario.motion.motion_kind.sees(scenario), scenario.controlled)
     step = loop.rate * loop.dead_time * quicker_at(parts, Asked(lambda path: number_at(scenario, path)), angle)
     ratio = step / case.settled.wanted_change
@@ -268,16 +279,19 @@ def _request_beyond_reach(case: Case) -> str:
     settled = case.settled
     if case.overshoots or controlled_in(case.recording) is None:
         return ""
-    angle, torque = case.channel("angle"), static_torque(case.device)
+    angle = case.channel("angle")
+    torque = static_torque(case.device)
     places = np.unique(np.linspace(0, angle.size - 1, _SAMPLES).astype(np.intp))
     reaches = np.array([torque_reach(case.device, float(angle[place]), torque) for place in places])
     reference = case.reference[places]
-    above, below = reference - reaches[:, 1], reaches[:, 0] - reference
+    above = reference - reaches[:, 1]
+    below = reaches[:, 0] - reference
     share = float(np.mean((above > 0.0) | (below > 0.0)))
     if share <= (0.0 if settled.given_peak < LEAST_PEAK_WALK * settled.requested_peak else _OFTEN):
         return ""
     at = int(np.argmax(np.maximum(above, below)))
     upwards = bool(above[at] > 0.0)
-    asked, gives = level_text("N m", float(reference[at])), _reach_text(float(reaches[at, int(upwards)]), upwards)
+    asked = level_text("N m", float(reference[at]))
+    gives = _reach_text(float(reaches[at, int(upwards)]), upwards)
     often = f"for {100.0 * share:.0f} % of the time the controller requests more torque than the actuator gives"
     return f"{often}, such as {asked} where the actuator gives {gives}"

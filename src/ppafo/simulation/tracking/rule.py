@@ -187,8 +187,11 @@ def task_parts(scenario: Scenario, recording: Recording) -> list[SettledPart]:
     """
     (reference, value), time, count = followed(recording), recording.time, len(recording)
     duration = float(time[-1] - time[0])
-    interval, largest, start = duration / (count - 1), extent(recording), hold_start(recording)
-    profile, choice = PROFILES[scenario.reference.kind], scenario.reference
+    interval = duration / (count - 1)
+    largest = extent(recording)
+    start = hold_start(recording)
+    profile = PROFILES[scenario.reference.kind]
+    choice = scenario.reference
     of_one = replace(choice, settings={name: first(setting) for name, setting in choice.settings.items()})
     period = None if profile.period is None else profile.period(profile_parameters(of_one))
     # The summary of the reference that a run without recording has at its end.
@@ -216,7 +219,8 @@ def task_parts(scenario: Scenario, recording: Recording) -> list[SettledPart]:
     for part, of in zip(
         settled_parts(scenario, numbers, smallest_change(scenario)), (sums.part, sums.before, sums.worst), strict=True
     ):
-        since, end = int(of.since), int(of.end)
+        since = int(of.since)
+        end = int(of.end)
         is_last = of is sums.part
         single = SettledPart._make(each.item() if isinstance(each, np.ndarray | np.generic) else each for each in part)
         found.append(
@@ -245,7 +249,8 @@ def settled_parts(scenario: Scenario, metrics: Mapping[str, Floats], least: floa
     is_upwards = np.abs(highest - initial) >= np.abs(lowest - initial)
     peak = np.where(is_upwards, metrics["settled_top"] - initial, initial - metrics["settled_bottom"])
     is_at_peak = (np.abs(metrics["settled_final"] - initial) >= (1.0 - SAME_LEVEL) * change) & (change > 0.0)
-    profile, is_angle = PROFILES[scenario.reference.kind], scenario.controlled == ANGLE
+    profile = PROFILES[scenario.reference.kind]
+    is_angle = scenario.controlled == ANGLE
     angle_range = np.maximum(change, highest - lowest) if is_angle else 0.0
     common: dict[str, Any] = {
         "value_range": metrics["settled_highest"] - metrics["settled_lowest"],
@@ -258,7 +263,8 @@ def settled_parts(scenario: Scenario, metrics: Mapping[str, Floats], least: floa
     def part(prefix: str) -> SettledPart:
         of: dict[str, Any] = {name: metrics[f"{prefix}_{name}"] for name in PART_SUMS}
         swings = {name: Swing(0.0, of[name], 0.0) for name in ("swing", "lag_swing")}
-        path, way = of["path"], np.abs(of["last"] - of["first"])
+        path = of["path"]
+        way = np.abs(of["last"] - of["first"])
         interval = metrics["settled_interval"]
         periods = math.inf if frequency is None else of["taken"] * interval * frequency
         # The error of a loop that lags reverses, too.
@@ -289,12 +295,14 @@ def settled_parts(scenario: Scenario, metrics: Mapping[str, Floats], least: floa
 
 def smallest_change(scenario: Scenario) -> float:
     """Smallest wanted change that is judged, from the range of the controlled quantity [SI unit of that quantity]."""
-    kind, device = CONTROLLED[scenario.controlled], scenario.device
+    kind = CONTROLLED[scenario.controlled]
+    device = scenario.device
     if kind.name == TORQUE:
         lowest, highest = torque_reach(device, 0.5 * (device.actuator.angle_min + device.actuator.angle_max))
     else:
         limits = limits_of(device, kind)
-        lowest, highest = float(limits.lowest), float(limits.highest)
+        lowest = float(limits.lowest)
+        highest = float(limits.highest)
     # A torque or a difference of pressures goes from 0 to one end of its range.
     one_way = 0.5 if kind.name in (TORQUE, "pressure_difference") else 1.0
     return max(SMALLEST_CHANGE * one_way * abs(highest - lowest), SMALLEST_SIZE * kind.size)
@@ -305,7 +313,8 @@ def most_reversals(scenario: Scenario, duration: float | None = None) -> float:
 
     Infinite for a controller that may switch. The default duration is the duration of the run.
     """
-    law, stride_time = scenario.law, scenario.motion.stride_time
+    law = scenario.law
+    stride_time = scenario.motion.stride_time
     duration = first(scenario.run.duration) if duration is None else duration
     # A law that requests openings between shut and open should not reverse, where the valve has these openings.
     if law is None or is_pair(scenario) or not scenario.motion.motion_kind.asks_gradually(law):
@@ -398,7 +407,8 @@ def part_limits(settled: SettledPart, is_switched: bool) -> PartLimits:
         return limits
     wanted = np.asarray(settled.wanted_change)
     at_rest = wanted / np.maximum(1.0 - np.asarray(settled.motion), _TINY)
-    mean, span = LARGEST_MEAN_SWITCHED * at_rest, LARGEST_SPAN_SWITCHED * at_rest
+    mean = LARGEST_MEAN_SWITCHED * at_rest
+    span = LARGEST_SPAN_SWITCHED * at_rest
     return PartLimits(LARGEST_SHARE_SWITCHED * wanted, mean, span, np.full_like(at_rest, np.inf))  # type: ignore[arg-type]
 
 
@@ -407,13 +417,16 @@ def excess_of_part(settled: SettledPart, is_switched: bool) -> _TaskExcess:
 
     ``is_switched`` is true for a valve without gradual openings. The numbers of ``settled`` may be arrays (runs,).
     """
-    wanted, mean_error, motion = settled.wanted_change, np.abs(settled.mean_error), np.asarray(settled.motion)
+    wanted = settled.wanted_change
+    mean_error = np.abs(settled.mean_error)
+    motion = np.asarray(settled.motion)
     error, oscillation = over_samples(error_and_oscillation, settled, part_limits(settled, is_switched))
     overshoot = (settled.peak / wanted - 1.0) / (LARGEST_PEAK - 1.0) * (1.0 - motion)
     if is_switched:
         # A limit cycle beside the reference has a large mean error, and reverses.
         swings = (settled.error_deviation > mean_error) | (np.asarray(settled.error_reversals) > MOST_REVERSALS)
-        oscillation, overshoot = np.where(swings, error, 0.0), np.zeros_like(motion)
+        oscillation = np.where(swings, error, 0.0)
+        overshoot = np.zeros_like(motion)
     share = np.asarray(settled.rms_error / wanted)
     is_still = (share > LARGEST_SHARE) & (settled.value_range <= SMALLEST_MOVE * wanted)
     standstill = np.where(is_still, share / LARGEST_SHARE, 0.0)
@@ -444,10 +457,12 @@ def available_torque(scenario: Scenario) -> tuple[Floats, Floats]:
     the largest torque counts.
     """
     device = scenario.device
-    actuator, locked = device.actuator, scenario.motion.locked_angle
+    actuator = device.actuator
+    locked = scenario.motion.locked_angle
     fractions = (0.0,) if locked is not None else np.linspace(0.0, 1.0, _ANGLES).tolist()
     first, travel = (actuator.angle_min, actuator.angle_max - actuator.angle_min) if locked is None else (locked, 0.0)
-    model, plant = ACTUATORS[actuator.kind].model, plant_parameters(device)
+    model = ACTUATORS[actuator.kind].model
+    plant = plant_parameters(device)
     at_lowest, at_highest = reaching_pressures(device)
     angles = [first + fraction * travel for fraction in fractions]
     highest = [torque_of(model, plant, angle, *at_highest) for angle in angles]
@@ -463,7 +478,8 @@ def misses_for_reach(scenario: Scenario, parts: Sequence[SettledPart], turning: 
     is_lacking = parts[0].beyond_reach > 0.0
     if not np.any(is_lacking):
         return np.asarray(is_lacking)
-    reach, switches = available_torque(scenario), only_switches(scenario, scenario.law)
+    reach = available_torque(scenario)
+    switches = only_switches(scenario, scenario.law)
     found = np.fmax.reduce([excess_of_part(_within_reach(part, *reach), switches).largest for part in parts])
     return np.asarray(is_lacking & (np.fmax(found, turning) <= 1.0))
 

@@ -161,7 +161,8 @@ def _distinct(form: Callable[[float, int], Any], number: float, limit: float) ->
 @in_units(lambda result: result.scenario.device.shown)
 def tracking_in(result: "RecordedResult") -> Tracking:
     """Verdict on a result: it follows its reference, does not, or is not judged, for a reason."""
-    scenario, name = result.scenario, result.scenario.controlled
+    scenario = result.scenario
+    name = result.scenario.controlled
     if scenario.controller.is_open_loop:
         return Tracking(None, name, OPEN_LOOP)
     if not result.status.is_completed and result.status.kind == "diverged":
@@ -182,7 +183,9 @@ def _failing(case: Case, turning: float, rate: float) -> Tracking:
     """Verdict on a run that does not follow; ``turning`` and ``rate`` [1/s] as of ``_judged``."""
     assert case.failure is not None
     criterion, number, limit, found = _decided(case, turning, rate)
-    settled, walks, settings = case.settled, not case.scenario.follows_reference, case.scenario.controller.settings
+    settled = case.settled
+    walks = not case.scenario.follows_reference
+    settings = case.scenario.controller.settings
     wanted = settings["largest_torque"] if case.overshoots and walks else settled.wanted_change
     return Tracking(
         follows=False,
@@ -208,18 +211,24 @@ def _failing(case: Case, turning: float, rate: float) -> Tracking:
 
 def _decided(case: Case, turning: float, rate: float) -> tuple[Criterion, float, float, str]:
     """Criterion of a failure, number and limit that decided [SI; of reversals per second or stride], all in words."""
-    scenario, settled, when = case.scenario, case.settled, _time_text(case.settled)
-    walks, text = not scenario.follows_reference, partial(change_text, scenario.controlled)
-    words, change = CONTROLLED[scenario.controlled].words, settled.wanted_change
+    scenario = case.scenario
+    settled = case.settled
+    when = _time_text(case.settled)
+    walks = not scenario.follows_reference
+    text = partial(change_text, scenario.controlled)
+    words = CONTROLLED[scenario.controlled].words
+    change = settled.wanted_change
     wanted = text(change if walks else min(change, extent(case.recording)))
     if case.failure == "does not move":
-        moved, at = text(settled.value_range).partition(" ")[0], when * (settled.end > 0.0)
+        moved = text(settled.value_range).partition(" ")[0]
+        at = when * (settled.end > 0.0)
         found = f"the {words} loop does not move: {moved} of the requested {wanted}{at}"
         return "movement", settled.value_range, SMALLEST_MOVE * change, found
     if case.overshoots:
         largest = scenario.controller.settings["largest_torque"] if walks else change
         limit = (LARGEST_PEAK_WALK if walks else LARGEST_PEAK) * largest
-        peak, most = text(settled.peak).partition(" ")[0], text(largest) if walks else wanted
+        peak = text(settled.peak).partition(" ")[0]
+        most = text(largest) if walks else wanted
         allowed = _distinct(text, settled.peak, limit)[1]
         return (
             "peak",
@@ -256,18 +265,22 @@ def _decided(case: Case, turning: float, rate: float) -> tuple[Criterion, float,
     else:
         name = CRITERION_TEXTS.get(criterion, criterion)
         said = f"the {words} does not follow its reference: {name} {found} ({allowed} allowed){when}"
-    missing, is_at_rest = settled.mean_error, settled.rests and not case.is_approaching
+    missing = settled.mean_error
+    is_at_rest = settled.rests and not case.is_approaching
     is_constant = abs(missing) > max(0.9 * settled.rms_error, limit) and criterion in ("RMS error", "mean error")
     if not case.oscillates and is_at_rest and is_constant:
         found, allowed = _distinct(text, abs(missing), limit)
-        begins, side = f"{when.strip()} " if settled.end > 0.0 else "", "below" if missing < 0.0 else "above"
+        begins = f"{when.strip()} " if settled.end > 0.0 else ""
+        side = "below" if missing < 0.0 else "above"
         said = f"{begins}the {words} stays {found} {side} its reference ({allowed} allowed)"
     return criterion, number, limit, said
 
 
 def _following(case: Case, _turning: float, _rate: float) -> Tracking:
     """Verdict on a run that follows its reference, or that says too little for a verdict."""
-    scenario, settled, controlled = case.scenario, case.settled, CONTROLLED[case.scenario.controlled]
+    scenario = case.scenario
+    settled = case.settled
+    controlled = CONTROLLED[case.scenario.controlled]
     criteria = _criteria(case)
     name, number, limit = max(criteria, key=lambda each: each[1] / max(each[2], _LEAST))
     verdict = Tracking(True, controlled.name, "", "", "", name, number, limit, since=settled.start)
@@ -296,7 +309,8 @@ def _following(case: Case, _turning: float, _rate: float) -> Tracking:
             error_text += f", {100.0 * error / settled.wanted_change:.0f} % of the requested change"
         is_limited = limit < _UNLIMITED * settled.wanted_change
         errors.append(f"{each} {error_text}" + (f" ({limit_text} allowed{reason})" if is_limited else ""))
-    overshoot, way = settled.peak - settled.wanted_change, ""
+    overshoot = settled.peak - settled.wanted_change
+    way = ""
     if scenario.follows_reference and not case.only_switches and overshoot > LARGEST_SHARE * settled.wanted_change:
         way = f"; on the way it overshoots by {change_text(controlled.name, overshoot)}"
     # The interval stands before the errors: metrics of the same names cover the whole run.
@@ -308,8 +322,12 @@ def _following(case: Case, _turning: float, _rate: float) -> Tracking:
 
 def _criteria(case: Case) -> tuple[_Judged, ...]:
     """Errors of the judged part that may be above their limits: name, number and limit [SI], most telling first."""
-    scenario, settled, switches = case.scenario, case.settled, case.only_switches
-    mean, wanted, asked = abs(settled.mean_error), settled.wanted_change, settled.requested_peak
+    scenario = case.scenario
+    settled = case.settled
+    switches = case.only_switches
+    mean = abs(settled.mean_error)
+    wanted = settled.wanted_change
+    asked = settled.requested_peak
     if not scenario.follows_reference:
         missing = asked - settled.given_peak
         peak: _Judged = ("missing peak torque", missing, (1.0 - LEAST_PEAK_WALK) * asked)
@@ -332,7 +350,9 @@ def _criteria(case: Case) -> tuple[_Judged, ...]:
 
 def _undecided_text(scenario: Scenario, reason: str) -> str:
     """Reason why a task has no verdict, and untried times with which its reference rests before the end."""
-    run, choice, count = scenario.run, scenario.reference, _SAMPLES_ADVISED
+    run = scenario.run
+    choice = scenario.reference
+    count = _SAMPLES_ADVISED
     longer = [2.0**power * run.duration for power in range(1, _MOST_DOUBLINGS)]
     trials = [(run.duration, choice, list[str]())]
     trials += [(duration, choice, [f"run.duration={duration:.12g} s"]) for duration in longer]
@@ -366,26 +386,31 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float] | None:
     The case is that of the last part of the reference, or of the worst earlier one if it fails more. The further
     numbers are the command reversals divided by the limit [-], and the reversals per second that were counted.
     """
-    scenario, recording = result.scenario, result.recording
+    scenario = result.scenario
+    recording = result.recording
     reversals = result.metrics[REVERSALS].value if REVERSALS in result.metrics else 0.0
-    per, most = max(recording.duration, 1.0), most_reversals(scenario, recording.duration)
+    per = max(recording.duration, 1.0)
+    most = most_reversals(scenario, recording.duration)
     if not scenario.follows_reference:
         limit = float(scenario.controller.settings.get("largest_torque", 0.0))
         settled = settled_walk(recording, limit, float(np.max(available_torque(scenario)[1])))
         if settled is None:
             return None
-        turning, rate = reversals / most, reversals / recording.duration
+        turning = reversals / most
+        rate = reversals / recording.duration
         failure = failure_of_walk(settled, turning, limit)
         return Case(scenario, recording, settled, failure), turning, rate
     parts = task_parts(scenario, recording)
     counted = parts[0].command_reversal_rate * per if is_noisy(scenario) else reversals
-    turning, switches = counted / most, only_switches(scenario, scenario.law)
+    turning = counted / most
+    switches = only_switches(scenario, scenario.law)
     ratios = [excess_of_part(part, switches) for part in parts]
     # An earlier part decides where it fails and the last one does not, or fails less. The reach is that of all parts.
     errors = [float(np.nan_to_num(np.max(each[:-1]))) for each in ratios]
     largest = [errors[0], *(error * (error > 1.0) for error in errors[1:])]
     place = int(np.argmax(largest))
-    excess, settled = ratios[place], parts[place]
+    excess = ratios[place]
+    settled = parts[place]
     failure = failure_of_task(excess, turning)
     is_for_reach = bool(misses_for_reach(scenario, parts, turning))
     case = Case(scenario, recording, settled, failure, is_for_reach)
@@ -404,15 +429,19 @@ def remarks_on(result: "RecordedResult", follows: bool) -> Iterator[str]:
 
     ``follows``: True if the run follows its reference; a stop may then bear the torque that the reference asks for.
     """
-    scenario, recording = result.scenario, result.recording
-    motion, actuator, reached = scenario.motion, scenario.device.actuator, []
+    scenario = result.scenario
+    recording = result.recording
+    motion = scenario.motion
+    actuator = scenario.device.actuator
+    reached = []
     yield standing_still(result, follows)
     if isinstance(motion, FreeMotion):
         for side, stop in (("lower", actuator.angle_min), ("upper", actuator.angle_max)):
             rests = np.abs(recording["angle"] - stop) <= ON_STOP
             # A start on a stop is the scenario's, unless the joint never leaves the stop.
             at = np.flatnonzero(rests & ~np.concatenate([[not rests.all()], rests[:-1]]))
-            name, share = f"its {side} stop ({level_text('rad', stop)})", f"{100.0 * np.mean(rests):.0f} % of the run"
+            name = f"its {side} stop ({level_text('rad', stop)})"
+            share = f"{100.0 * np.mean(rests):.0f} % of the run"
             lies = "" if share.startswith("0 ") else f" and lies on it for {share}"
             reached += [f"{name} at {recording.time[index]:.3g} s{lies}" for index in at[:1]]
         if reached and follows and scenario.controlled != ANGLE and motion.leg is None:
@@ -429,16 +458,16 @@ def standing_still(result: "RecordedResult", follows: bool) -> str:
 
     ``follows``: as for ``remarks_on``; without it the verdict has the remedy, unless the loop is open.
     """
-    scenario, angle, motion = result.scenario, result.recording["angle"], result.scenario.motion
+    scenario = result.scenario
+    angle = result.recording["angle"]
+    motion = result.scenario.motion
     if not isinstance(motion, FreeMotion) or scenario.controlled == ANGLE or not result.status.is_completed:
         return ""
     if np.ptp(angle) > 0.0 or stop_of(scenario, angle):
         return ""
     load = motion.outside_torque + gravity_torque(float(angle[0]), scenario.device.foot_plate.gravity_torque)
-    holding, most = (
-        float(scenario.device.friction.static_torque),
-        float(np.abs(result.recording["torque"] - load).max()),
-    )
+    holding = float(scenario.device.friction.static_torque)
+    most = float(np.abs(result.recording["torque"] - load).max())
     exceeds = f"exceeds the largest torque of actuator and load, {level_text('N m', most)}"
     text = f"the joint does not move: static friction of {level_text('N m', holding)} {exceeds}"
     if follows or scenario.controller.is_open_loop:
@@ -449,19 +478,25 @@ def standing_still(result: "RecordedResult", follows: bool) -> str:
 
 def _without_effect(scenario: Scenario) -> str:
     """Overridden sensor values that the controller does not read in this scenario, as text; "" without any."""
-    sensors, law, actuator = scenario.sensors, scenario.law, scenario.device.actuator
-    unread, read = "sensors.angle_", "the measured pressure"
+    sensors = scenario.sensors
+    law = scenario.law
+    actuator = scenario.device.actuator
+    unread = "sensors.angle_"
+    read = "the measured pressure"
     if scenario.controller.is_open_loop:
-        unread, read = "sensors.", "no sensor"
+        unread = "sensors."
+        read = "no sensor"
     elif law is None or not scenario.follows_reference or len(law.controls) < 2:
         # Only laws of several quantities are declared to read nothing but the controlled one.
         return ""
     elif scenario.controlled == ANGLE:
-        unread, read = "sensors.pressure_", "the measured angle"
+        unread = "sensors.pressure_"
+        read = "the measured angle"
     elif scenario.controlled == TORQUE:
         angles = np.linspace(actuator.angle_min, actuator.angle_max, 4).tolist()
         depends = len({torque_reach(scenario.device, angle) for angle in angles}) > 1
-        unread, read = "none" if depends else unread, "a torque computed from the measured pressures"
+        unread = "none" if depends else unread
+        read = "a torque computed from the measured pressures"
     names = [override.typed for override in read_overrides(scenario.origin.overrides)]
     is_quiet = not (sensors.angle_noise or sensors.pressure_noise)
     names = [name for name in names if name.startswith(unread) or (is_quiet and name == "sensors.seed")]

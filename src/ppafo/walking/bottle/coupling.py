@@ -133,7 +133,9 @@ class SupplyCourse:
         and hose, ``ice`` the enthalpy difference of the dry ice in the seat, ``room`` the heat from the room, and
         ``delivered`` the enthalpy of the gas downstream of the hose.
         """
-        first, last, supply = self.met[0].state, self.met[-1].state, self.supply.bottle.supply
+        first = self.met[0].state
+        last = self.met[-1].state
+        supply = self.supply.bottle.supply
         parts = (
             first.energy - last.energy,
             supply.wall.wall_heat_capacity * (first.wall_temperature - last.wall_temperature),
@@ -228,18 +230,22 @@ def _walk_once(
     schedule: Schedule | None,
 ) -> BatchResult:
     """Simulate a run on a bottle and continue ``course`` in place; return the rows of the run, up to its end."""
-    batch, supply, met = batch_of(run), course.supply, course.met
+    batch = batch_of(run)
+    supply = course.supply
+    met = course.met
     count = batch.clock.step_count
     block = begin_block(batch, effort_for(batch))
     states = row_numbers(batch.program.state_rows())
     regulated, lines = ([row for path, row in states.items() if path.endswith(end)] for end in (REGULATED, _LINE))
-    every, walked_before = max(1, round(supply.coupling / run.step)), course.walked
+    every = max(1, round(supply.coupling / run.step))
+    walked_before = course.walked
     lanes = _Lanes(run, device, met[0].offered.gas_temperature)
     # The line falls for a moment at each draw: its best over some strides counts, of two meetings at least.
     window = max(2, math.ceil(_STRIDES * stride_time / (every * run.step))) * every
     # The line starts at the set pressure.
     gauges = [(0, 1.0)]
-    done, first = 0, float(batch.states[regulated, 0].sum())
+    done = 0
+    first = float(batch.states[regulated, 0].sum())
     before = first
     walk, rest, longest = schedule or Schedule(math.inf, 0.0, math.inf)
     until_rest = max(1, round((walk - course.walked % walk) / run.step)) if rest > 0.0 else count
@@ -251,7 +257,8 @@ def _walk_once(
         steps = min(most, count - done, until_rest)
         block.set_parameters(lanes.rows, lanes.parameters(meeting.offered))
         block.advance(steps)
-        done, until_rest = done + steps, until_rest - steps
+        done = done + steps
+        until_rest = until_rest - steps
         course.walked = walked_before + done * run.step
         time = course.walked + course.rested
         progress(course.walked / 60.0, (walked_before + count * run.step) / 60.0)
@@ -262,7 +269,8 @@ def _walk_once(
             course.ended = SupplyEnding(DIVERGED, message, min(time, failed))
             break
         regulated_mass = float(block.states[regulated, 0].sum())
-        drawn, before = regulated_mass - before, regulated_mass
+        drawn = regulated_mass - before
+        before = regulated_mass
         met.append(met_again(supply, meeting, drawn, steps * run.step, time))
         gauges = [
             *((step, gauge) for step, gauge in gauges if step > done - window),
@@ -277,7 +285,8 @@ def _walk_once(
                 met.append(met_again(supply, met[-1], 0.0, resting / parts, met[-1].time + resting / parts))
             course.rested += resting
             # Gauges of before the rest say nothing of the bottle that has warmed in it.
-            gauges, until_rest = [(done, 1.0)], round(walk / run.step)
+            gauges = [(done, 1.0)]
+            until_rest = round(walk / run.step)
     course.regulated += before - first
     result = block.result()
     record = result.record if done == count else result.record[: (done - 1) // int(run.record_every) + 1]
@@ -286,7 +295,8 @@ def _walk_once(
 
 def met_again(supply: BottleSupply, meeting: Meeting, drawn: float, duration: float, time: float) -> Meeting:
     """Return the exchange at ``time`` [s], after the device has drawn a mass ``drawn`` [kg] over ``duration`` [s]."""
-    table, content = supply.bottle.fluid.table, meeting.offered.content
+    table = supply.bottle.fluid.table
+    content = meeting.offered.content
     state = advance_supply(table, supply.line, supply.bottle.supply, meeting.state, content, drawn, duration)
     return Meeting(time, state, supply.offers(state, content.temperature, drawn))
 
@@ -320,16 +330,20 @@ class _Lanes:
         The gas product is proportional to the gas temperature T, the conductances of valve and leak to 1/sqrt(T). Set
         pressure and largest flow of the regulator follow, then the parameters of the effects at the temperature T.
         """
-        plant, warmth = self.run.plant, now.gas_temperature / self.start
+        plant = self.run.plant
+        warmth = now.gas_temperature / self.start
         slower = mass_flow_ratio(math.sqrt(warmth))
-        product, valve, leak = plant.gas_product, plant.valve_conductance, plant.leak_conductance
+        product = plant.gas_product
+        valve = plant.valve_conductance
+        leak = plant.leak_conductance
         own = [product * warmth, valve * slower, leak * slower, now.set_pressure, now.largest_flow]
         device = replace(self.device, gas=replace(self.device.gas, temperature=now.gas_temperature))
         return np.array([*own, *(number for effect in self.effects for number in leaves(effect_row(effect, device)))])
 
     def gauge(self, mass: float, now: SupplyNow) -> float:
         """Return the gauge pressure of the line, which contains a mass [kg], divided by the set gauge pressure [-]."""
-        plant, lines = self.run.plant, self.run.lines
+        plant = self.run.plant
+        lines = self.run.lines
         assert lines is not None, "a bottle feeds lines"
         product = plant.gas_product * now.gas_temperature / self.start
         pressure, _ = line_pressures(lines.parameters, product, lines.initial._replace(mass_1=mass))

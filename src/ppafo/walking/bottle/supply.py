@@ -95,7 +95,8 @@ class BottleSupply:
 
     def fed(self, line: SupplyLine) -> SupplyLine:
         """Return the supply lines with droop and initial largest flow of the bottle's regulator."""
-        droop, most = self.bottle.regulator.droop, self.offers_first().largest_flow
+        droop = self.bottle.regulator.droop
+        most = self.offers_first().largest_flow
         return replace(line, plantarflexion=replace(line.plantarflexion, droop=droop, largest_flow=most))
 
     def unresolved(self, flow: float, fastest: float) -> str:
@@ -155,12 +156,14 @@ def read_bottle(reading: DocumentReader, device: Device) -> BottleSupply | None:
         path = Path(name)
         is_file = path.suffix == ".toml" and not path.is_absolute()
         bottle = load_bottle(reading.folder / path if is_file else name, own)
-    pressure, room = device.supply.pressure, device.supply.atmospheric_pressure
+    pressure = device.supply.pressure
+    room = device.supply.atmospheric_pressure
     # Gauge is the same at both: a bottle's file knows no atmosphere, and stands in that of the device.
     own_pressure = to_si(bottle.entries[SET_PRESSURE].value, bottle.entries[SET_PRESSURE].unit, "Pa_a", room)
     wrong: list[PpafoError] = []
     if not is_of_bottle(device.gas.molar_mass, bottle):
-        species, fed = bottle.fluid.name, device.gas.species
+        species = bottle.fluid.name
+        fed = device.gas.species
         choice = f"set gas.species={species}, or choose a bottle of {fed}"
         wrong.append(reading.refusal(BOTTLE_NAME, f"contains {species}, but the device uses {fed}: {choice}"))
     # A bottle of the package is set to the paper's pressure, which does not apply to other devices.
@@ -182,7 +185,8 @@ def read_bottle(reading: DocumentReader, device: Device) -> BottleSupply | None:
     if not nodes[0] < numbers["temperature"] <= nodes[-1]:
         known = f"must be above {nodes[0]:g} K and at most {nodes[-1]:g} K, the data range of {bottle.fluid.name}"
         raise reading.refusal(f"{BOTTLE}.temperature", known)
-    mass, table = numbers["fill"] * bottle.mass, bottle.fluid.table
+    mass = numbers["fill"] * bottle.mass
+    table = bottle.fluid.table
     most = bottle.volume * (liquid_density if has_liquid(table) else densest_gas)(table, numbers["temperature"])
     if mass >= most:
         fits = f"only {GRAMS_PER_KILOGRAM * most:.4g} g fit into the bottle at {numbers['temperature']:g} K"
@@ -207,10 +211,10 @@ def read_bottle(reading: DocumentReader, device: Device) -> BottleSupply | None:
             )
     if unresolved := supply.unresolved(supply.offers_first().largest_flow, _FASTEST):
         raise reading.refusal(BOTTLE_NAME, unresolved)
-    pressure = supply.offers_first().content.pressure
-    if pressure < regulator.set_pressure + regulator.pressure_margin:
-        atmosphere, needed = device.supply.atmospheric_pressure, regulator.set_pressure + regulator.pressure_margin
-        has, needs = (shown_text(each, "Pa_a", atmosphere=atmosphere) for each in (pressure, needed))
+    filled = supply.offers_first().content.pressure
+    needed = regulator.set_pressure + regulator.pressure_margin
+    if filled < needed:
+        has, needs = (shown_text(each, "Pa_a", atmosphere=room) for each in (filled, needed))
         raise reading.refusal(BOTTLE_NAME, f"has {has} at the start, but its regulator needs {needs}")
     return supply
 

@@ -31,9 +31,12 @@ _LEAST_TORQUE = 0.1
 
 def bottle_figure(result: WalkResult) -> "Figure":
     """Return the figure of a walk on a bottle, with the reason of the end below the panels."""
-    supply, recording, peaks = result.supply, result.recording, result.peak_torques
+    supply = result.supply
+    recording = result.recording
+    peaks = result.peak_torques
     assert supply is not None, "drawn for a walk on a bottle"
-    times, values = supply.times, supply.values
+    times = supply.times
+    values = supply.values
     end = float(recording.time[-1])
     dots = {"marker": ".", "markersize": 2.5, "linewidth": 0.8}
     torque = [Mark("line", recording.time[result.starts[:-1]] if peaks.size else peaks, peaks, style=dots)]
@@ -55,7 +58,8 @@ def bottle_figure(result: WalkResult) -> "Figure":
     delivered = values["regulated_pressure"]
     behind = [Mark("line", times, delivered, label="delivered at most", colour=GREY, style=_DASHED)]
     if result.starts.size > 1:
-        line, strikes = recording["line_pressure_1"], recording.time[result.starts[:-1]]
+        line = recording["line_pressure_1"]
+        strikes = recording.time[result.starts[:-1]]
         span = tuple(pick.reduceat(line, result.starts)[:-1] for pick in (np.minimum, np.maximum))
         behind.append(Mark("band", strikes, span, label="line, in a stride", style={"alpha": 0.3}))
     regulator = supply.supply.bottle.regulator

@@ -37,14 +37,16 @@ def legs_of(result: WalkResult, turns: Floats) -> tuple[Posture, Posture, list[b
 
     The last list is True at instants of mid-swing with toes below the ground, as in the metric ``lowest_toes``.
     """
-    motion, recording = walk_of(result.scenario), result.recording
+    motion = walk_of(result.scenario)
+    recording = result.recording
     timing = gait_timing(motion.gait)
     path = ankle_path(motion.gait, timing, motion.wearer)
     # All strides have the stride time of the gait.
     times = turns * motion.gait.stride_time
     names = ("shank_angle", "angle", "healthy_angle")
     shank, angle, healthy = (np.interp(times, recording.time, recording[name]) for name in names)
-    worn, phases = path.posture(turns, shank, angle), turns % 1.0
+    worn = path.posture(turns, shank, angle)
+    phases = turns % 1.0
     must_clear = (phases >= timing.clearance_from) & (phases < timing.clearance_to)
     return worn, path.posture(turns, shank, healthy), (must_clear & (worn.toe[:, 1] < 0.0)).tolist()
 
@@ -80,7 +82,8 @@ def frames_figure(comparison: WalkComparison) -> "Figure":
     from matplotlib.figure import Figure
 
     with house_style():
-        width, scale = printed_width(_WIDTH), print_scale()
+        width = printed_width(_WIDTH)
+        scale = print_scale()
         count = _FRAMES if width >= _WIDTH else _FEW_FRAMES
         # As high as the legs of a row are in frames of this width.
         row = (1.0 - 2.0 * _EDGE) * width * (_VIEW[1] - _VIEW[0]) / (_SLOT * count)
@@ -90,7 +93,9 @@ def frames_figure(comparison: WalkComparison) -> "Figure":
         rows = figure.subplots(2, 1, sharex=True)
         _draw_frames(rows[0], comparison.without_device, "without the device", WITHOUT, count)
         _draw_frames(rows[1], comparison.with_device, "with the device", WITH, count)
-        worn, width, height = comparison.with_device, width / scale, height / scale
+        worn = comparison.with_device
+        width = width / scale
+        height = height / scale
         remark = "outline: healthy foot; cross: toes below ground in mid-swing"
         # About 15 letters of the remark go on an inch.
         remark = "\n".join(textwrap.wrap(remark, round(15.0 * width)))

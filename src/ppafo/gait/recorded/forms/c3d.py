@@ -78,7 +78,8 @@ def read_c3d(path: str | Path) -> MotionTable:
     analogs: Floats = content["data"]["analogs"][0]
     if analogs.shape[0] and frames:
         # Analog samples are a whole multiple of the points' by the format.
-        step, analog = analogs.shape[1] // frames, parameters["ANALOG"]
+        step = analogs.shape[1] // frames
+        analog = parameters["ANALOG"]
         channels = [bare_label(label) for label in _texts(analog, "LABELS")][: analogs.shape[0]]
         stated = _texts(analog, "UNITS")
         for row, name in enumerate(channels):
@@ -91,7 +92,8 @@ def read_c3d(path: str | Path) -> MotionTable:
     # A trial that was cut keeps its clock: events count from the beginning of the capture.
     first = max(0, int(content["header"]["points"].get("first_frame", 0)))
     subject = parameters.get("PROCESSING", {})
-    mass, height = _number(subject, _BODY), _number(subject, _HEIGHT)
+    mass = _number(subject, _BODY)
+    height = _number(subject, _HEIGHT)
     # Plug-in Gait keeps the height in mm.
     stature = None if height is None else height / 1000.0 if height > 100.0 else height
     events, on_events = _events(parameters.get("EVENT", {}))
@@ -180,15 +182,19 @@ def _events(group: Any) -> tuple[Events, tuple[str, ...]]:
     present = [name for name in ("CONTEXTS", "LABELS", "TIMES") if name in group]
     if len(present) < 3:
         return {}, ("events not read: EVENT needs CONTEXTS, LABELS and TIMES",) if present else ()
-    sides, kinds = _texts(group, "CONTEXTS"), _texts(group, "LABELS")
+    sides = _texts(group, "CONTEXTS")
+    kinds = _texts(group, "LABELS")
     times = np.asarray(group["TIMES"]["value"], dtype=np.float64)
-    count, assumption = len(kinds), ""
+    count = len(kinds)
+    assumption = ""
     if times.shape == (2, count) or (count < 2 and times.size == 2 * count):
         pairs = times.reshape(2, count)
     elif times.size == 2 * count:
-        pairs, assumption = times.reshape(count, 2).T, "a flat list of minutes and seconds"
+        pairs = times.reshape(count, 2).T
+        assumption = "a flat list of minutes and seconds"
     elif times.size == count:
-        pairs, assumption = np.array([np.zeros(count), times.reshape(-1)]), "a flat list of seconds"
+        pairs = np.array([np.zeros(count), times.reshape(-1)])
+        assumption = "a flat list of seconds"
     else:
         pairs = np.zeros((2, 0))
     if not count == len(sides) == pairs.shape[1]:

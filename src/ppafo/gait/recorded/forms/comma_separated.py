@@ -58,8 +58,10 @@ def read_plain_csv(path: str | Path) -> MotionTable:
     lines = lines_of(path)
     first = next((number for number, line in enumerate(lines) if line.strip() and not line.startswith("#")), 0)
     header = _header(path)
-    delimiter, pairs = delimiter_of(header), _named_columns(header)
-    names, units = [name for name, _ in pairs], [unit for _, unit in pairs]
+    delimiter = delimiter_of(header)
+    pairs = _named_columns(header)
+    names = [name for name, _ in pairs]
+    units = [unit for _, unit in pairs]
     at = next((place for place, name in enumerate(names) if name.lower() in _TIMES), 0)
     at = at if all(name.lower() in COUNTERS for name in names[:at]) else 0
     clock = names[at] if names[at].lower() in _TIMES else ""

@@ -132,12 +132,15 @@ def convention_of_map(columns: GaitMap, tables: Sequence[MotionTable], side: Sid
 
 def _check_forward(table: MotionTable, columns: GaitMap, foot: str, labels: Sequence[str]) -> None:
     """Raise DataError for a forward axis of a map against which the foot points or, without a foot, the ankle moves."""
-    shank, ankle = columns.shank_angle, columns.ankle_angle
-    heel, toe = ankle.heel or _first(labels, foot, _HEELS), ankle.toe or _first(labels, foot, _TOES)
+    shank = columns.shank_angle
+    ankle = columns.ankle_angle
+    heel = ankle.heel or _first(labels, foot, _HEELS)
+    toe = ankle.toe or _first(labels, foot, _TOES)
     for name, mapped in (("shank_angle", shank), ("ankle_angle", ankle)):
         if mapped.terms is not None or mapped.forward is None:
             continue
-        axis, sign = mapped.forward[-1], -1.0 if mapped.forward.startswith("-") else 1.0
+        axis = mapped.forward[-1]
+        sign = -1.0 if mapped.forward.startswith("-") else 1.0
         tip, back, way = (table.columns.get(f"{label}.{axis}") for label in (toe, heel, shank.ankle))
         is_reversed = False
         if tip is not None and back is not None:
@@ -188,7 +191,8 @@ def _axes(
     foot if the ankle hardly travels. The foot determines the sign, because over a part of a stride on a treadmill the
     ankle may travel backwards.
     """
-    at_knee, at_ankle = _point(table, knee), _point(table, ankle)
+    at_knee = _point(table, knee)
+    at_ankle = _point(table, ankle)
     if at_knee is None or at_ankle is None:
         return "x", "z", ()
     apart = at_knee - at_ankle

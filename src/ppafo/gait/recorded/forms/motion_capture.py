@@ -95,7 +95,8 @@ def _nexus_block(path: str | Path, lines: Sequence[str], start: int) -> _NexusBl
     axes = [axis.lower() for axis in cells_of(head[2], delimiter)] if len(head) == 4 else []
     if axes[:2] != ["frame", "sub frame"]:
         raise DataError(f"{path}: line {start + 4}: must begin with 'Frame' and 'Sub Frame'")
-    labels, last = [], ""
+    labels = []
+    last = ""
     written = cells_of(head[1], delimiter)
     for label in [*written, *[""] * len(axes)][: len(axes)]:
         # A label stands above the first of its columns.
@@ -170,8 +171,10 @@ def _read_motive(path: str | Path) -> MotionTable:
         rows = {"Type": above[0], "Name": above[1]}
     if at < 0 or "Name" not in rows:
         raise DataError(f"{path}: has no header 'Frame, Time (Seconds), X, Y, Z, ...' below the marker names")
-    axes, quantities = cells_of(lines[at], ","), above[-1]
-    kinds, labels = rows.get("Type", rows["Name"]), rows["Name"]
+    axes = cells_of(lines[at], ",")
+    quantities = above[-1]
+    kinds = rows.get("Type", rows["Name"])
+    labels = rows["Name"]
     names = []
     for place, axis in enumerate(axes):
         kind, label, quantity = (cells[place] if place < len(cells) else "" for cells in (kinds, labels, quantities))
@@ -187,7 +190,8 @@ def _read_motive(path: str | Path) -> MotionTable:
 def _read_dflow(path: str | Path) -> MotionTable:
     """Return markers and force plates of a D-Flow text file: ``TimeStamp``, ``FrameNumber``, ``LABEL.PosX``, ..."""
     lines = lines_of(path)
-    names, units = [], []
+    names = []
+    units = []
     for cell in cells_of(lines[0].lstrip("% "), "\t"):
         column = _DFLOW_COLUMN.fullmatch(cell)
         is_marker = column is not None and column[2] == "Pos"

@@ -159,14 +159,16 @@ def opensim_convention(table: MotionTable, side: Side, _body_mass: float) -> Con
     shank angle is the sum of pelvis tilt, hip flexion and knee flexion in the sagittal plane. The lean of the thigh is
     computed in the same way, with the hip at the origin of the pelvis.
     """
-    foot, terms = side[0], []
+    foot = side[0]
+    terms = []
     for name in ("pelvis_tilt", f"hip_flexion_{foot}", f"{_KNEE}{foot}"):
         flexion = table.columns.get(name) if name.startswith(_KNEE) else None
         # Where its flexion counts above 0, as in the newer OpenSim models, the knee is subtracted.
         counts_above = flexion is not None and bool(np.nanmax(flexion) > -np.nanmin(flexion))
         terms.append(f"-{name}" if counts_above else name)
     # Columns that this package adds to the coordinates of OpenSim (``storage/opensim.py``) are read as they are.
-    own_shank, own_knee = f"shank_angle_{foot}", {"knee_forward", "knee_up"} <= set(table.columns)
+    own_shank = f"shank_angle_{foot}"
+    own_knee = {"knee_forward", "knee_up"} <= set(table.columns)
     has_pressure = "centre_of_pressure" in table.columns
     usual = GaitMap(
         shank_angle=ShankMap(terms=(own_shank,) if own_shank in table.columns else tuple(terms)),
@@ -226,8 +228,10 @@ def _turned_forward(table: MotionTable) -> MotionTable:
         )
     if abs(facing) <= _ALONG:
         return table
-    cosine, sine = np.cos(facing), np.sin(facing)
-    x, z = table.columns["pelvis_tx"], table.columns["pelvis_tz"]
+    cosine = np.cos(facing)
+    sine = np.sin(facing)
+    x = table.columns["pelvis_tx"]
+    z = table.columns["pelvis_tz"]
     columns = {**table.columns, "pelvis_tx": cosine * x - sine * z, "pelvis_tz": sine * x + cosine * z}
     if "pelvis_tilt" in columns:
         tilt = columns["pelvis_tilt"] * degree["pelvis_tilt"]
