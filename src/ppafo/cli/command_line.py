@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import inspect
 import re
-import sys
 import types
 import typing
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -82,7 +81,6 @@ class Command:
             said = inspect.getdoc(self.function()) or ""
         first_line = str(said).split("\n", 1)[0]
         return first_line[:1].lower() + first_line[1:].rstrip(".")
-
 
 
 @dataclass(frozen=True, slots=True)
@@ -303,8 +301,7 @@ class CommandParser(argparse.ArgumentParser):
     def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
         """Print the text of ``--help`` or ``--version``; unlike argparse, a failed write is an error."""
         with output.printing():
-            super()._print_message(message, file)
-            sys.stdout.flush()
+            print(message, end="", file=file, flush=True)
 
     def options(self) -> set[str]:
         """Return all options of the parser and its subcommands."""

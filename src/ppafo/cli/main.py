@@ -19,7 +19,6 @@ from ppafo.cli.command_line import (
 )
 from ppafo.cli.commands import COMMANDS, OTHERS, check_words, list_commands
 from ppafo.cli.output import EXIT_INTERRUPTED
-
 from ppafo.errors import PpafoError
 from ppafo.kinds import fault_of_user, kind_at
 from ppafo.version import __version__
@@ -35,7 +34,6 @@ _NAMES = {
     "PARAMETERS": "ppafo.parameters:list_sets",
     "GAIT": "ppafo.gait:list_gaits",
     "BOTTLE": "ppafo.parameters.bottles.bottle:list_bottles",
-
 }
 """Functions that list bundled names for completion, by value placeholder of the help."""
 _SCRIPT = """\
