@@ -30,8 +30,6 @@ from ppafo.wording import nearest_name, read_by
 if TYPE_CHECKING:
     from importlib.abc import InspectLoader
 
-    from _typeshed import SupportsWrite
-
 PROGRESS = "progress"
 """Parameter of a command function for the progress display, not set on the command line."""
 PLUGINS = "plugins"
@@ -298,10 +296,10 @@ class CommandParser(argparse.ArgumentParser):
             raise UsageError(f"{bad_value[1]} {bad_value[2]}")
         raise UsageError(f"{message.removeprefix('argument ')}; see '{self.prog} --help'")
 
-    def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
+    def _print_message(self, message: str, _file: object = None) -> None:
         """Print the text of ``--help`` or ``--version``; unlike argparse, a failed write is an error."""
         with output.printing():
-            print(message, end="", file=file, flush=True)
+            print(message, end="", flush=True)
 
     def options(self) -> set[str]:
         """Return all options of the parser and its subcommands."""

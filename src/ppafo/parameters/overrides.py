@@ -63,7 +63,7 @@ def read_overrides(texts: Iterable[str], error: type[PpafoError] = ParameterErro
     Raises ``error`` for all other texts, in sorted order.
     """
     in_order = tuple(texts)
-    wrong = []
+    wrong = Faults()
     read = {}
     for text in sorted(in_order):
         on_one_line = one_line(text)
