@@ -27,9 +27,11 @@ VARIABLE = "PPAFO_PLUGINS"
 """Environment variable that passes the names of plug-ins to child processes."""
 
 _NAME = r"[^\W\d]\w*(?:\.[^\W\d]\w*)*"
-_MODULE, OBJECT = re.compile(_NAME), re.compile(rf"{_NAME}:[^\W\d]\w*")
+_MODULE = re.compile(_NAME)
+OBJECT = re.compile(rf"{_NAME}:[^\W\d]\w*")
 _OBJECT_IN_TEXT = re.compile(rf"(?<![\w.:/])({_NAME}):[^\W\d]\w*(?![\w.:/])")
-_SUFFIX, _PACKAGE = ".py", "__init__.py"
+_SUFFIX = ".py"
+_PACKAGE = "__init__.py"
 
 
 @dataclass(frozen=True, slots=True)

@@ -136,3 +136,14 @@ def test_packing_and_text_change_no_count() -> None:
     assert code_counts(unpacked) == CodeCounts(tokens=15, statements=4, definitions=1)
     assert code_counts(explained) == code_counts(unpacked)
     assert code_counts(packed).statements == code_counts(unpacked).statements
+
+
+def test_an_assignment_of_several_values_holds_the_result_of_one_expression() -> None:
+    packed = [
+        f"{path.relative_to(ROOT)}:{node.lineno}"
+        for path in (ROOT / "src" / "ppafo").rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Tuple) and isinstance(node.targets[0], ast.Tuple)
+    ]
+    # Those that are left assign at once what each needs of the others, as a recursion does.
+    assert len(packed) < 20, packed

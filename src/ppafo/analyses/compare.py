@@ -672,7 +672,8 @@ def _change_panels(found: ComparisonResult) -> list[ask.Panel]:
             if change.size == 0:
                 continue
             # A few distant changes would squeeze all others into one bar.
-            colour, (low, high) = colours[case.configuration], np.percentile(change, (0.5, 99.5))
+            colour = colours[case.configuration]
+            low, high = np.percentile(change, (0.5, 99.5))
             # Fewer bins for fewer draws, so that each has some of them.
             counts, edges = np.histogram(change, min(40, max(8, round(1.5 * change.size**0.5))), (low, high))
             marks.append(ask.Mark("bars", edges, counts, label=case.configuration, colour=colour))

@@ -53,8 +53,9 @@ DistributedStudy = Annotated[
 MethodName = Annotated[str, Word("sobol|shapley")]
 DEFAULT_SAMPLES = {"sobol": 8192, "shapley": 2048}
 """Default number of blocks by method: tens of thousands of runs for a few values."""
-_FEWEST, _MOST = 64, 2**17
-"""Limits of the number of blocks."""
+# Limits of the number of blocks.
+_FEWEST = 64
+_MOST = 2**17
 _NEGLIGIBLE = 0.01
 """Fraction of the largest index below which the influence of a value counts as negligible."""
 _MAXIMUM_LINES = 5

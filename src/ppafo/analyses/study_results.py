@@ -50,7 +50,8 @@ if TYPE_CHECKING:
 
     from ppafo.studies.study import Study
 
-SUMMARY, BANDS = "summary.json", "bands.parquet"
+SUMMARY = "summary.json"
+BANDS = "bands.parquet"
 _EXAMPLES = 5
 """Number of failed runs that the summary names."""
 COLOURS = (ask.BLUE, ask.VERMILION, ask.GREEN, ask.ORANGE, ask.GREY)
@@ -585,7 +586,8 @@ def _map(
         places.append(levels)
         if declared[path]["kind"] == "list":
             # Drawn side by side, in cells of equal size, with their values at the ticks.
-            axis_kinds[-1], places[-1] = ask.Kind(kinds[path].axis), np.arange(float(levels.size))
+            axis_kinds[-1] = ask.Kind(kinds[path].axis)
+            places[-1] = np.arange(float(levels.size))
             labels = [f"{value:g}" for value in kinds[path].values(levels)]
             settings |= {f"{side}ticks": places[-1], f"{side}ticklabels": labels}
         elif declared[path].get("spacing") == "logarithmic":

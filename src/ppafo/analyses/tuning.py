@@ -31,14 +31,18 @@ from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.units.shown import in_units, quantity_of_unit
 from ppafo.wording import count_of, first_twice, percentage, without_exponent
 
-MAXIMUM_DRAWS, NOISE_STREAMS, FRESH_DRAWS = 4096, 16, 1024
-"""Largest number of draws of each candidate, number of noise streams if only the sensors are uncertain, and number of
-draws outside the search, over which the tuned gains are evaluated."""
-INFEASIBLE, UNUSABLE = 1.0e6, 1.0e12
-"""Lowest cost of a candidate that violates a constraint, and of one with a failed run, whose fraction is added."""
-_TOLERANCE, _REFINEMENTS = 1.0e-3, 60
-"""Relative spread of the candidates' costs below which a start has converged; largest number of candidates of the
-simplex for each gain."""
+# Largest number of draws of each candidate, number of noise streams if only the sensors are uncertain, and number of
+# draws outside the search, over which the tuned gains are evaluated.
+MAXIMUM_DRAWS = 4096
+NOISE_STREAMS = 16
+FRESH_DRAWS = 1024
+# Lowest cost of a candidate that violates a constraint, and of one with a failed run, whose fraction is added.
+INFEASIBLE = 1.0e6
+UNUSABLE = 1.0e12
+# Relative spread of the candidates' costs below which a start has converged; largest number of candidates of the
+# simplex for each gain.
+_TOLERANCE = 1.0e-3
+_REFINEMENTS = 60
 _START_COLOURS = (ask.GREEN, ask.PURPLE, ask.ORANGE, ask.GREY)
 """Colours of the starts of a search; the gains before and after have other colours."""
 Gains = Mapping[str, float]

@@ -10,9 +10,11 @@ from ppafo.kinds import Kinds, is_installed, package_of
 from ppafo.plugins import name_modules_in
 from ppafo.wording import known_names
 
-_ANALYSES, _VERBS = "ppafo.analyses", "ppafo.cli.verbs"
-_SETS, _GAITS = f"{_VERBS}:sets_list", f"{_VERBS}:gait_list"
-_STUDIES = "ppafo.analyses.study_results:studies_of_the_package", "study"
+_ANALYSES = "ppafo.analyses"
+_VERBS = "ppafo.cli.verbs"
+_SETS = f"{_VERBS}:sets_list"
+_GAITS = f"{_VERBS}:gait_list"
+_STUDIES = "ppafo.studies.loading:FILE", "ppafo.analyses.study_results:studies_of_the_package"
 
 
 def _of_scenario(verb: str) -> Command:
@@ -24,8 +26,8 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
     "the paper": {
         "reproduce": Command(
             f"{_ANALYSES}.reproduce.question:reproduce",
+            library="ppafo.analyses.reproduce.claims:FILE",
             listing="ppafo.analyses.reproduce.claims:list_studies",
-            listed="publication",
         ),
     },
     "your device": {
@@ -54,10 +56,10 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
         "compare": _of_scenario(f"{_ANALYSES}.compare:compare"),
         "sensitivity": Command(f"{_ANALYSES}.sensitivity:sensitivity", *_STUDIES),
         "find": _of_scenario(f"{_ANALYSES}.find:find"),
-        "tune": Command(f"{_ANALYSES}.tune:tune", listing="ppafo.analyses.tuning:TUNING"),
+        "tune": Command(f"{_ANALYSES}.tune:tune", library="ppafo.analyses.tuning:TUNING"),
         "linearise": _of_scenario(f"{_ANALYSES}.linearise.question:linearise"),
-        "design": Command(f"{_ANALYSES}.design.question:design", listing="ppafo.analyses.design.problem:FILE"),
-        "bottle": Command(f"{_ANALYSES}.endurance.question:bottle", listing="ppafo.parameters.bottles.bottle:FILE"),
+        "design": Command(f"{_ANALYSES}.design.question:design", library="ppafo.analyses.design.problem:FILE"),
+        "bottle": Command(f"{_ANALYSES}.endurance.question:bottle", library="ppafo.parameters.bottles.bottle:FILE"),
     },
     "walk": {
         "gait": CommandGroup(
@@ -71,7 +73,7 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
         ),
         "walk": Command(
             f"{_ANALYSES}.walk.question:walk_with_and_without",
-            listing="ppafo.walking.loading:FILE",
+            library="ppafo.walking.loading:FILE",
             default_folder="ppafo.analyses.walk.question:default_folder",
         ),
     },
@@ -82,7 +84,7 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
                 "c": _of_scenario(f"{_VERBS}:export_c"),
                 "firmware": _of_scenario("ppafo.processor.commands:export_firmware"),
                 "fmu": _of_scenario(f"{_VERBS}:export_fmu"),
-                "opensim": Command("ppafo.cli.opensim:export_opensim", listing="ppafo.walking.loading:FILE"),
+                "opensim": Command("ppafo.cli.opensim:export_opensim", library="ppafo.walking.loading:FILE"),
                 "figure": Command("ppafo.cli.figure:export_figure"),
             },
         ),

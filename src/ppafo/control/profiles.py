@@ -167,14 +167,17 @@ def table_value(profile: TabulatedProfile, time: float) -> tuple[float, float, f
     segment = next_segment(segment, place, profile.period, profile.value_01)
     # An unused knot lies at or beyond the end of a repetition: the line then ends at the first knot of the next.
     is_last = segment.end >= profile.period
-    end, last = profile.period if is_last else segment.end, profile.value_01 if is_last else segment.last
+    end = profile.period if is_last else segment.end
+    last = profile.value_01 if is_last else segment.last
     rate = (last - segment.first) / (end - segment.start)
     return profile.level + segment.first + rate * (place - segment.start), rate, 0.0
 
 
 def disordered_knot(profile: TabulatedProfile) -> float:
     """Return the number of the first used knot, from 2, that is not later than the one before; 0 if there is none."""
-    found, number, before = 0.0, 1.0, 0.0
+    found = 0.0
+    number = 1.0
+    before = 0.0
     for knot in profile.knots:
         number = number + 1.0
         is_first = found == 0.0 and knot.time < profile.period and knot.time <= before
@@ -190,7 +193,8 @@ def table_period(profile: TabulatedProfile) -> float:
 
 def table_bounds(profile: TabulatedProfile) -> tuple[float, float]:
     """Lowest and highest value [N m or rad] of the used knots, with the offset ``level``."""
-    lowest, highest = profile.value_01, profile.value_01
+    lowest = profile.value_01
+    highest = profile.value_01
     for knot in profile.knots:
         is_used = knot.time < profile.period
         lowest = min(lowest, knot.value) if is_used else lowest
@@ -210,7 +214,10 @@ class _KnotWindow(NamedTuple):
 def next_window(window: _KnotWindow, place: float, knot: Knot) -> _KnotWindow:
     """Return the window, shifted by one knot to include ``knot`` if ``place`` [s] is past the window's end."""
     passed = place >= window.end.time
-    earlier, start, end, later = window.start, window.end, window.later, knot
+    earlier = window.start
+    start = window.end
+    end = window.later
+    later = knot
     return _KnotWindow(
         earlier=Knot(
             earlier.time if passed else window.earlier.time, earlier.value if passed else window.earlier.value
@@ -241,10 +248,12 @@ def window_at(profile: TabulatedProfile, place: float) -> _KnotWindow:
     second = repeated_knot(profile, first, profile.knots[0])
     third = repeated_knot(profile, second, profile.knots[1])
     # The last knot that is used, a repetition earlier.
-    time, value = 0.0, profile.value_01
+    time = 0.0
+    value = profile.value_01
     for knot in profile.knots:
         is_used = knot.time < profile.period
-        time, value = (knot.time if is_used else time), (knot.value if is_used else value)
+        time = knot.time if is_used else time
+        value = knot.value if is_used else value
     window = _KnotWindow(earlier=Knot(time - profile.period, value), start=first, end=second, later=third)
     before = third
     for knot in profile.knots[2:]:
@@ -306,7 +315,8 @@ def smooth_bounds(profile: TabulatedProfile) -> tuple[float, float]:
             place = numerator / denominator if denominator != 0.0 else 0.0
             if 0.0 < place < length:
                 turned = value + place * (rate + place * (0.5 * bend + place * twist))
-                lowest, highest = min(lowest, turned), max(highest, turned)
+                lowest = min(lowest, turned)
+                highest = max(highest, turned)
     return lowest, highest
 
 

@@ -22,11 +22,10 @@ LEAST_RATE = 1.0e-9
 """Smallest rate of a torque or a pressure that is divided by [SI]."""
 LARGEST_OPENING = 0.77
 """Opening of the dead-zone law for a slow chamber; the rest of the torque change comes from the falling pressure."""
-DEAD_ZONE_SHARE, RELEASE_SHARE = 0.042, 0.0062
-"""Errors at which a dead-zone law opens the valve and closes it again, divided by the torque range [-].
-
-Both are 0.21 N m and 0.031 N m for the 5 N m that the paper's actuator reaches at 50 psi_g.
-"""
+# Errors at which a dead-zone law opens the valve and closes it again, divided by the torque range [-]. Both are 0.21
+# N m and 0.031 N m for the 5 N m that the paper's actuator reaches at 50 psi_g.
+DEAD_ZONE_SHARE = 0.042
+RELEASE_SHARE = 0.0062
 SAMPLES_LATE = 1.5
 """Delay of a sampled command in sample periods: one for the computation, half of one for the zero-order hold."""
 SHARPNESS = 1.0 / 128.0

@@ -46,7 +46,9 @@ from ppafo.simulation.tracking.rule import available_torque, only_switches
 
 Group = Literal["law", "start", "device", "sensors", "load", "task"]
 """Part of a scenario that a change concerns."""
-AS_IT_IS, JOINT_GAINS, _DEFAULT = "as it is", "with all gains chosen together", "with the default"
+AS_IT_IS = "as it is"
+JOINT_GAINS = "with all gains chosen together"
+_DEFAULT = "with the default"
 IDEAL_WORDS = ("without", "with a quicker", "with a straight", "with initial", "with gas", "with the sign")
 """First words of changes that take away a property, rather than choose a better one."""
 SLOWER_REFERENCE = "with a slower reference"
@@ -79,18 +81,22 @@ _TOGETHER = {
 """Number that is made ideal with another one."""
 _ISOTHERMAL = 1.0e4
 """Heat transfer coefficient [W/(m^2 K)] with which gas keeps the temperature of its walls."""
-_VALVES, _SMALL_VALVES = (1.5, 2.0, 4.0, 10.0, 30.0, 100.0, 300.0, 1.0e3, 3.0e3, 1.0e4), (0.3, 0.1, 0.03, 0.01)
-"""Sizes of a valve divided by the present one [-]."""
+# Sizes of a valve divided by the present one [-].
+_VALVES = (1.5, 2.0, 4.0, 10.0, 30.0, 100.0, 300.0, 1.0e3, 3.0e3, 1.0e4)
+_SMALL_VALVES = (0.3, 0.1, 0.03, 0.01)
 _FILLED = 5.0e-3
 """Time in which a larger valve fills the chambers at least [s]: a larger one needs shorter steps and helps no more."""
-_SUPPLIES, _LEAST_PRESSURE = (1.15, 1.4, 1.8, 2.5, 4.0), 1.0e3
-"""Gauge pressures of supplies divided by the present ones [-], and lowest pressure [Pa absolute]."""
-_RATES, _TOP_RATE = (4.0, 10.0, 30.0, 100.0), 2.0e3
-"""Rates of a controller divided by the present one [-], and the highest one [Hz]."""
+# Gauge pressures of supplies divided by the present ones [-], and lowest pressure [Pa absolute].
+_SUPPLIES = (1.15, 1.4, 1.8, 2.5, 4.0)
+_LEAST_PRESSURE = 1.0e3
+# Rates of a controller divided by the present one [-], and the highest one [Hz].
+_RATES = (4.0, 10.0, 30.0, 100.0)
+_TOP_RATE = 2.0e3
 _VOLUMES = (0.25, 4.0)
 """Dead volumes divided by the present ones [-]."""
-_SPEEDS, _SIZES = (0.5, 0.25, 0.1, 0.05), (0.8, 0.5, 0.25, 0.1)
-"""Speed and size of the reference divided by the present ones [-]; anything follows a reference of almost nothing."""
+# Speed and size of the reference divided by the present ones [-]; anything follows a reference of almost nothing.
+_SPEEDS = (0.5, 0.25, 0.1, 0.05)
+_SIZES = (0.8, 0.5, 0.25, 0.1)
 _WITHIN_REACH = 0.9
 """Torque that replaces a reference far beyond reach, divided by what the actuator gives [-]."""
 _LONGER = 2.0
@@ -115,8 +121,9 @@ _SAME = 0.02
 """Relative difference up to which two settings count as the same [-]."""
 _COMMANDS = (-1.0, 64.0, 8.0, 1.0 / 16.0)
 """Factors on the command of a Python object, whose gains are unknown; the first one detects a wrong sign [-]."""
-_FLAWS_OF_OBJECT, _LONGEST_OF_OBJECT = 3, 4.0
-"""Number of flaws that are made ideal with a Python object, and its longest run divided by the present one [-]."""
+# Number of flaws that are made ideal with a Python object, and its longest run divided by the present one [-].
+_FLAWS_OF_OBJECT = 3
+_LONGEST_OF_OBJECT = 4.0
 
 
 class Change(NamedTuple):

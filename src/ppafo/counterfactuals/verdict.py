@@ -45,12 +45,14 @@ _MARGIN = 0.9
 """Largest excess of a smaller step, whose text rounds to three digits [-]."""
 _PAIRED = 7
 """Number of changes of which pairs are tried where none suffices alone."""
-_CAUSES, _REMEDIES = 3, 5
-"""Largest number of causes in a sentence, and of changes of which a smaller step is tried."""
+# Largest number of causes in a sentence, and of changes of which a smaller step is tried.
+_CAUSES = 3
+_REMEDIES = 5
 _EFFORT = {"law": 0, "start": 1, "device": 2, "sensors": 3, "load": 4, "task": 5}
 """Order of remedies by what is changed with least effort."""
-_DEPTH, _LAST = {"device": 0.0, "sensors": 0.0, "load": 0.0, "start": 0.0, "law": 1.0, "task": 2.0}, 3.0
-"""Order of causes: what is not ideal before what is chosen, and what the task asks for at last."""
+# Order of causes: what is not ideal before what is chosen, and what the task asks for at last.
+_DEPTH = {"device": 0.0, "sensors": 0.0, "load": 0.0, "start": 0.0, "law": 1.0, "task": 2.0}
+_LAST = 3.0
 _CHOSEN = 2.0
 """Factor on what a better choice leaves, by which it comes after a property made ideal [-]."""
 _NEARER = 0.5
@@ -76,7 +78,8 @@ def verdict_of(result: "Result | WalkResult") -> "Tracking":
 def _with_causes(verdict: "Tracking", scenario: Scenario) -> "Tracking":
     """Return the verdict on a run that does not follow with causes and a remedy."""
     rated = _table(_first_strides(scenario))
-    (_, excess), best = rated[0], _best_of_words(rated[1:])
+    _, excess = rated[0]
+    best = _best_of_words(rated[1:])
     follow = [each for each in best if each[1] <= 1.0]
     if follow:
         lowest = {change.words: math.inf for change, _ in rated}

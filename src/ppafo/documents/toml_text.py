@@ -26,7 +26,8 @@ SCHEMA = "https://json-schema.org/draft/2020-12/schema"
 """JSON Schema version of the published file layouts."""
 LONGEST_VALUE = 60
 """Largest number of characters of a value in a message."""
-_LONGEST_LABEL, _KEPT_AT_EACH_END = 200, 60
+_LONGEST_LABEL = 200
+_KEPT_AT_EACH_END = 60
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
 _DEEP_KEY = re.compile(
     rf"(?:^[ \t]*+\[{{0,2}}+|[{{,])[ \t]*+(?>{_PART}\.[ \t]*+){{{MAXIMUM_LEVELS}}}", re.ASCII | re.MULTILINE

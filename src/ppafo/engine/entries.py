@@ -18,7 +18,8 @@ SystemError if the garbage collector lets a second thread parse before the first
 
 Node = TypeVar("Node", bound=ast.AST)
 
-FLOAT, INT = "float64", "int64"
+FLOAT = "float64"
+INT = "int64"
 ARRAY = "float64[::1]"
 
 HEADER = '''"""Generated from the functions of ppafo; their hash is in the file name. Not to be edited."""

@@ -191,7 +191,8 @@ class StepText:
         if self.ending and text != self.collector.definitions.get(tree.name, ""):
             tree.name += self.ending
             text = self.collector.decorated(tree, file)
-        self.collector.owners[tree.name], self.collector.definitions[tree.name] = function, text
+        self.collector.owners[tree.name] = function
+        self.collector.definitions[tree.name] = text
         if handed:
             self.collector.needs[tree.name] = handed
         return tree.name

@@ -62,7 +62,9 @@ class PythonLanes:
         record: Floats,
         trace: Floats,
     ) -> None:
-        (self.groups, states), self.records, self.trace = tables[0], record, trace
+        self.groups, states = tables[0]
+        self.records = record
+        self.trace = trace
         self.signal_history = signal_history
         self.command_history = command_history
         # Lanes that only fill a vector repeat the last run.

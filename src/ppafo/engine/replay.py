@@ -17,8 +17,9 @@ from ppafo.engine.rows import group_of, leaf_paths, leaves, of_each, row_numbers
 
 COMMAND = "result.command"
 """Path of the present command among the states of a program."""
-_LONG_AGO, _LEAST_PART = -1.0e3, 1.0e-9
-"""Time since which a first command has stood, and shortest part of a motion of a valve [s]."""
+# Time since which a first command has stood, and shortest part of a motion of a valve [s].
+_LONG_AGO = -1.0e3
+_LEAST_PART = 1.0e-9
 
 
 class AngleSegment(NamedTuple):

@@ -20,8 +20,9 @@ from ppafo.wording import argument_text
 
 FEW_STRIDES = 0.2
 """Default duration [min] of a walk."""
-SHORTEST_STRIDE, LONGEST_STRIDE = 0.4, 5.0
-"""Accepted time [s] between two heel strikes of one foot."""
+# Accepted time [s] between two heel strikes of one foot.
+SHORTEST_STRIDE = 0.4
+LONGEST_STRIDE = 5.0
 
 
 def opensim_files(result: WalkResult, side: Side, strikes: Sequence[float]) -> dict[str, bytes]:

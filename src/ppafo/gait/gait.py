@@ -42,8 +42,10 @@ CURVES: dict[str, str] = {
 }
 """Curves of a gait with their units; the first two are mandatory."""
 
-BODY_MASSES, STATURES, SPEEDS = (1.0, 500.0), (0.5, 2.5), (0.05, 4.0)
-"""Body masses [kg], statures [m] and walking speeds [m/s] of a wearer: wide limits that exclude only typing errors."""
+# Body masses [kg], statures [m] and walking speeds [m/s] of a wearer: wide limits that exclude only typing errors.
+BODY_MASSES = (1.0, 500.0)
+STATURES = (0.5, 2.5)
+SPEEDS = (0.05, 4.0)
 
 REQUIRED = ("shank_angle", "ankle_angle")
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.errors import DataError, Faults
+from ppafo.errors import DataError, raise_noted
 from ppafo.gait.gait import HARMONICS, KNEE, REQUIRED, Gait, fit_curve
 from ppafo.signals.recording import Floats
 from ppafo.wording import without_exponent
@@ -22,8 +22,9 @@ STRIDE_TIME = (0.5, 3.0)
 # Far from 0 and nearer to the half stride at which the other foot lies.
 _OTHER_FOOT = 0.3
 """Least delay between ankle and shank [strides] that shows two different feet, which are half a stride apart."""
-_ALIKE, _UNLIKE = 0.65, 0.4
-"""Limits of the correlation with a usual ankle angle [-]: least at the best shift (0.76), largest without a shift."""
+# Limits of the correlation with a usual ankle angle [-]: least at the best shift (0.76), largest without a shift.
+_ALIKE = 0.65
+_UNLIKE = 0.4
 _ALIKE_SHANK = 0.8
 """Least correlation with a usual shank angle without a shift [-] (0.97); a reversed sign gives less."""
 SHANK_RANGE = (25.0, 120.0)
@@ -36,13 +37,12 @@ _TURNED_BACK = 0.1
 
 Recorded shanks rotate forward by 0.15 to 0.25 of the range.
 """
-REMARKED_TILT, REFUSED_TILT = 5.0, 20.0
-"""Limits of the mean tilt of the standing foot in mid-stance [deg] for a remark, and for an error.
-
-Recorded feet on level ground have 0.5 to 4.6 deg, from the sole of the shoe and the placement of markers. A standing
-foot is not tilted by more than 20 deg: this is a heel of 6 cm on a foot of 17 cm from heel to ball, walking on the
-toes, or a ramp of 1 in 3. A larger tilt shows a wrong zero.
-"""
+# Limits of the mean tilt of the standing foot in mid-stance [deg] for a remark, and for an error. Recorded feet on
+# level ground have 0.5 to 4.6 deg, from the sole of the shoe and the placement of markers. A standing foot is not
+# tilted by more than 20 deg: this is a heel of 6 cm on a foot of 17 cm from heel to ball, walking on the toes, or a
+# ramp of 1 in 3. A larger tilt shows a wrong zero.
+REMARKED_TILT = 5.0
+REFUSED_TILT = 20.0
 CLEARLY_BETTER = 2.0
 """Factor by which the opposite sign of a curve must fit better, or give a larger value, to reject the given sign."""
 MOMENT_PEAK = (0.05, 3.5)
@@ -101,7 +101,7 @@ class MeanStride:
 
 def check_plausible(walk: MeanStride) -> None:
     """Raise DataError for an implausible mean stride; the message names file, curve, number and limits."""
-    Faults([DataError(fault) for fault in _faults(walk)]).raise_all()
+    raise_noted([DataError(fault) for fault in _faults(walk)])
 
 
 def _faults(walk: MeanStride) -> Iterator[str]:
@@ -201,7 +201,8 @@ def _of_shank(walk: MeanStride) -> Iterator[str]:
 
 def range_faults(where: str, angle: Floats, limits: tuple[float, float], is_whole: bool = False) -> Iterator[str]:
     """Yield the fault of an angle [rad] with an implausible range [deg]; a whole record has no upper limit."""
-    (low, high), travel = limits, float(np.ptp(np.degrees(angle)))
+    low, high = limits
+    travel = float(np.ptp(np.degrees(angle)))
     if not low <= travel <= (np.inf if is_whole else high):
         units = {"radians": np.degrees(travel), "degrees": np.radians(travel)}
         hint = "".join(f"; the numbers look like {unit}" for unit, number in units.items() if low <= number <= high)
@@ -274,7 +275,8 @@ def stride_remarks(curves: Mapping[str, Floats]) -> list[str]:
     ankle = curves["ankle_angle"]
     if "vertical_force" in curves:
         # Both ends are one phase, which must not count twice.
-        mean, (low, high) = float(np.mean(curves["vertical_force"][:-1])), USUAL_FORCE_MEAN
+        mean = float(np.mean(curves["vertical_force"][:-1]))
+        low, high = USUAL_FORCE_MEAN
         if not low <= mean <= high:
             remarks.append(
                 f"vertical_force has a mean of {mean:.3g} body weights, but each leg of a steady walk carries about "
@@ -361,7 +363,8 @@ def _of_loads(walk: MeanStride) -> Iterator[str]:
         yield from _outside(f"{where} has a mean of {{}} body weights", float(np.mean(force)), FORCE_MEAN)
         yield from _outside(f"{where} has a peak of {{}} body weights", float(np.max(force)), FORCE_PEAK)
     if "centre_of_pressure" in walk.curves:
-        place, (low, high) = walk.curves["centre_of_pressure"], UNDER_FOOT
+        place = walk.curves["centre_of_pressure"]
+        low, high = UNDER_FOOT
         back = float(np.min(place))
         front = float(np.max(place))
         if back < low or front > high or front - back < LEAST_ROLL:

@@ -13,8 +13,9 @@ from ppafo.wording import percentage, without_exponent
 if TYPE_CHECKING:
     from ppafo.signals import RecordingKind
 
-_NOTHING, _NEAREST = 1.0e-6, 0.05
-"""Fraction of an error [-] that is rounding, and least distance of an end from its value that sets digits [values]."""
+# Fraction of an error [-] that is rounding, and least distance of an end from its value that sets digits [values].
+_NOTHING = 1.0e-6
+_NEAREST = 0.05
 NAMED = 2
 """Number of parts of a variance that are named, the largest ones: a least share would hide one that is near it."""
 Verdict = Literal["identified", "holds for this model only", "not identifiable", "at its bound", "unit probably wrong"]

@@ -37,17 +37,23 @@ Residuals = Callable[[Floats], Floats]
 """Function from points [SI] (numbers, points) to residuals measured - model [SI] (rows, points); NaN if a run fails."""
 _UNITS_OF_NOISE = 3.0
 """Combined change of all residuals in a finite difference [noises]; with 30 fewer intervals held the true value."""
-_SHORTEST_STEP, _LONGEST_STEP = 1.0e-7, 1.0e-3
-"""Shortest and longest finite difference, as fractions of the scale of a variable [-]."""
+# Shortest and longest finite difference, as fractions of the scale of a variable [-].
+_SHORTEST_STEP = 1.0e-7
+_LONGEST_STEP = 1.0e-3
 _LEAST_NOISE = 1.0e-12
 """Least noise of a channel [largest residuals at the start], for a law that fits exactly."""
 _OF_ANY_SIZE = 1.0e8
 """Standard deviation of an error of unknown magnitude, relative to the noise [-]."""
-_ROUNDS, _EVALUATIONS, _GAUSS_NEWTON, _TRIES, _STEPS = 20, 40, 40, 10, 12
-"""Largest numbers of iterations between noise and variables, evaluations in a pass of the search, steps on whitened
-samples, trial points per limit, and steps of the other variables at each."""
-_SHORT, _SHARES = 0.1, np.array([1.0, 0.5, 0.25])[:, None]
-"""Shortest fraction of a step, from which its curvature is found too, and the longer ones; the best is taken [-]."""
+# Largest numbers of iterations between noise and variables, evaluations in a pass of the search, steps on whitened
+# samples, trial points per limit, and steps of the other variables at each.
+_ROUNDS = 20
+_EVALUATIONS = 40
+_GAUSS_NEWTON = 40
+_TRIES = 10
+_STEPS = 12
+# Shortest fraction of a step, from which its curvature is found too, and the longer ones; the best is taken [-].
+_SHORT = 0.1
+_SHARES = np.array([1.0, 0.5, 0.25])[:, None]
 _STILL = 1.0e-3
 """Change of the step between iterations [standard errors] at which noise and variables agree."""
 _RANK = 1.0e-13
@@ -62,30 +68,36 @@ SHAPE = "shape"
 """Marker in ``Conflict.number`` for residuals whose neighbours have the same sign; the law has another shape."""
 _SMOOTHEST = 0.15
 """Relative innovation [-] below which residuals are no noise: a lag of 90 samples, whereas 33 give 0.19 to 0.24."""
-_SIGNIFICANCE, _BY_CHANCE = 0.01, 0.001
-"""Significance levels of a difference between estimates, and of residuals that follow each other (3.1 errors) [-]."""
+# Significance levels of a difference between estimates, and of residuals that follow each other (3.1 errors) [-].
+_SIGNIFICANCE = 0.01
+_BY_CHANCE = 0.001
 _PARTING = 0.05
 """Smallest relative excess of a group's variance over the common variance [-] for a direction to be tested."""
-_LEFT_OUT, _LEVERAGE = 0.01, 0.1
-"""Largest fraction of samples left out, as outliers or for their leverage, and the leverage above which one is [-]."""
-_ROUGH, _FINE = 1.0e-3, 1.0e-4
-"""Relative decrease of the squares [-] that ends the robust pass of the search, and the second pass."""
-_GAIN, _CONVERGED = 1.0e-4, 0.5
-"""Decreases of the squares [-] below which a point is their minimum, and the search has converged to its errors."""
+# Largest fraction of samples left out, as outliers or for their leverage, and the leverage above which one is [-].
+_LEFT_OUT = 0.01
+_LEVERAGE = 0.1
+# Relative decrease of the squares [-] that ends the robust pass of the search, and the second pass.
+_ROUGH = 1.0e-3
+_FINE = 1.0e-4
+# Decreases of the squares [-] below which a point is their minimum, and the search has converged to its errors.
+_GAIN = 1.0e-4
+_CONVERGED = 0.5
 _AT_BOUND = 1.0e-6
 """Largest distance of a variable from its bound [-] that counts as at the bound, relative above 1."""
 _WIDEST = 12.0
 """Largest deviation of a tolerance in the search [scales]."""
 _UNDETERMINED = 0.5
 """Standard error of a combination of relative variables [-] above which it is not identifiable."""
-_SHOWN_WEIGHT, _OWN_SHARE = 0.1, 0.2
-"""Least weight of a variable in such a combination [-] for which it is listed, and counts as not identifiable."""
+# Least weight of a variable in such a combination [-] for which it is listed, and counts as not identifiable.
+_SHOWN_WEIGHT = 0.1
+_OWN_SHARE = 0.2
 _NEAR = 1.0e-3
 """Distance from a bound [widths of the interval] up to which an estimate counts as at its bound."""
 _NONE = 0.1
 """Upper end of an interval that begins at zero [typical magnitudes], below which the part is none."""
-_BETTER, _OTHER_STARTS = 1.0, 32
-"""Increase of the log-likelihood [-] by which another start replaces the first result, and number of such starts."""
+# Increase of the log-likelihood [-] by which another start replaces the first result, and number of such starts.
+_BETTER = 1.0
+_OTHER_STARTS = 32
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import get_args
 
-from ppafo.errors import Faults, IdentificationError
+from ppafo.errors import IdentificationError, PpafoError, noted_in, raise_noted
 from ppafo.identification.bench.flow import LARGEST_COEFFICIENT, FlowLaw, OpenValveFlowProblem
 from ppafo.identification.bench.free_decay import FreeDecayProblem
 from ppafo.identification.bench.law import BenchContext, BenchLaw, BenchResult
@@ -31,13 +31,13 @@ _NEAR = 1.5
 """Largest ratio [-] of a discharge coefficient in another unit to the value of the set, for the unit to be accused."""
 _FAR = 5.0
 """Ratio to the value of the set that another device may have, but a misread pressure too: psi as kPa makes 6.89 [-]."""
-_IMPOSSIBLE, _OTHER_UNITS = 300.0, ("N m", "Pa_d")
-"""Ratio to the value of the set that no device of its kind has [-], and units that are tried only for such a value."""
-_LARGE_SCATTER, _SMOOTHER = 0.01, 5.0
-"""Scatter of readings from which another unit is tried, and its ratio to the scatter with that unit to report it [-].
-
-The zero of a gauge pressure and the choked flow make a law of the absolute pressure fit one unit only.
-"""
+# Ratio to the value of the set that no device of its kind has [-], and units that are tried only for such a value.
+_IMPOSSIBLE = 300.0
+_OTHER_UNITS = ("N m", "Pa_d")
+# Scatter of readings from which another unit is tried, and its ratio to the scatter with that unit to report it [-].
+# The zero of a gauge pressure and the choked flow make a law of the absolute pressure fit one unit only.
+_LARGE_SCATTER = 0.01
+_SMOOTHER = 5.0
 _ROUNDING = 1.0e-6
 """Difference of scatter [-] of readings that are computed, in two units, for flow that is choked throughout."""
 
@@ -164,16 +164,16 @@ def read_tasks(
         window = -math.inf if first is None else first, math.inf if last is None else last
         sources: list[RecordingSource] = []
         for recording in procedure.recordings:
-            wrong = Faults()
-            with wrong:
+            wrong = list[PpafoError]()
+            with noted_in(wrong):
                 sources += reader.read(recording, procedure.columns, row_time, gas)
             if wrong and procedure.columns is not None:
                 # Missing channels of the map are said with what is wrong in it.
                 mapped = reader.columns[procedure.columns]
                 names = [name for name in mapped.channels if name != TIME]
-                with wrong:
+                with noted_in(wrong):
                     check_channels(recording, procedure, [*names, *(["direction"] if mapped.direction else [])])
-            wrong.raise_all()
+            raise_noted(wrong)
         tasks.append((procedure, tuple(sources), f"{reader.file}: procedure {number}, {kind}"))
         used += [
             UsedRecording(f"recording {at} of procedure {kind}", each.trace, each.recording, frozenset(), *window, kind)
@@ -189,16 +189,16 @@ def run_procedure(sources: tuple[RecordingSource, ...], problem: BenchProblem, c
 
     Raises IdentificationError, with the name of the recording or the label of the procedure first.
     """
-    wrong = Faults()
+    wrong: list[PpafoError] = []
     sources = tuple(replace(source, user=problem.kind) for source in sources)
     for source in sources:
-        with wrong:
+        with noted_in(wrong):
             check_channels(source.name, problem, source.recording.names)
     gas_used = ""
     if isinstance(problem, FlowLaw):
-        with wrong:
+        with noted_in(wrong):
             gas_used = problem.gas_used(problem.gas_of(sources, context))
-    wrong.raise_all()
+    raise_noted(wrong)
     try:
         result = problem.run(sources, context)
     except IdentificationError as error:

@@ -17,8 +17,9 @@ from ppafo.parameters.records import keyed
 from ppafo.simulation.recorded.usual_errors import ANGLE_ERRORS, PRESSURE_ERRORS, SUPPLY_ERROR, deviation_of_limit
 
 Sensed = Literal["zero", "gain"]
-GAS_TEMPERATURE, GAS_LAW = 15.0, 0.01
-"""Default limits of the gas temperature error [K] and of the relative departure from the ideal gas law [-]."""
+# Default limits of the gas temperature error [K] and of the relative departure from the ideal gas law [-].
+GAS_TEMPERATURE = 15.0
+GAS_LAW = 0.01
 LAG_OF_PRESSURE = 0.02
 """Default limit of the time constant of a pressure sensor with its tube and filter [s]."""
 HELD = {

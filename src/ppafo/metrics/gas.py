@@ -173,7 +173,8 @@ def of_gas(supplied: Floats, work: Floats) -> Floats:
     return ratio(gas_taken(supplied), work)
 
 
-_WORK, _SUPPLIED = (MOTION, "work"), (GAS, "gained.supplied_mass")
+_WORK = (MOTION, "work")
+_SUPPLIED = (GAS, "gained.supplied_mass")
 _COLDEST = "lowest temperature of the gas in a chamber, of a gas with an energy balance"
 WITH_ENERGY_BALANCE = frozenset({"temperature_1", "temperature_2", *ENERGIES})
 """Channels present only with an energy balance of the gas."""

@@ -43,10 +43,12 @@ LARGEST_EXCUSED = 1.1
 """Largest error divided by the path of the reference, or its largest value, that a quick ramp excuses [-]."""
 LAG_OF_JOINT = 0.6
 """Lag that a moving joint allows, divided by its speed and the wanted change [s/rad]."""
-LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE = math.radians(1.0), 0.03
-"""Largest range of the error of an angle at rest [rad], or divided by the way of the reference [-] if that is more."""
-LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE = math.radians(2.0), 0.05
-"""Largest angle error for a moving reference [rad], or divided by the reference's range [-] if that allows more."""
+# Largest range of the error of an angle at rest [rad], or divided by the way of the reference [-] if that is more.
+LARGEST_ANGLE_SWING = math.radians(1.0)
+LARGEST_SWING_SHARE = 0.03
+# Largest angle error for a moving reference [rad], or divided by the reference's range [-] if that allows more.
+LARGEST_ANGLE_ERROR = math.radians(2.0)
+LARGEST_ANGLE_SHARE = 0.05
 LARGEST_CREST = 1.5
 """Largest error divided by the largest RMS error, for a smooth wave of a torque or a pressure; of a lag it is 1.41."""
 LARGEST_SHARE_OF_WAVE = 0.5
@@ -58,8 +60,9 @@ a slow ramp has 0. In a walk it is the RMS torque error divided by the RMS of th
 TIMES_OF_SMALL_WAVE = 1.5
 """Reduction of the error that a moving joint allows, divided by the deviation of the reference [-]: of a wave that
 moves as much as is allowed at rest, the limit is that of a wave alone."""
-WHERE_REQUESTED, IN_PUSH_OFF = -1.0, -2.0
-"""In place of the start of a judged part, for a walk."""
+# In place of the start of a judged part, for a walk.
+WHERE_REQUESTED = -1.0
+IN_PUSH_OFF = -2.0
 FEWEST_PERIODS = 0.5
 """Periods of a reference in the settled part, below which the part may hold no peak of the reference [-]."""
 MOST_REVERSALS = 3.0

@@ -18,7 +18,8 @@ ONE_INSTANT = frozenset(
     f"final_{name}error" for name in ("" if controlled == TORQUE else f"{controlled}_" for controlled in CONTROLLED)
 )
 """Metrics of a single instant, which are arbitrary while the controlled quantity oscillates."""
-_RMS, _PEAK = "root-mean-square torque error", "largest absolute torque error of the whole run"
+_RMS = "root-mean-square torque error"
+_PEAK = "largest absolute torque error of the whole run"
 
 
 def error_of(recording: Recording) -> Floats:

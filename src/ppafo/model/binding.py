@@ -41,6 +41,8 @@ def made_of(frame: PlainFunction, name: str, parts: tuple[Any, ...]) -> PlainFun
     # The name and module decide the name in the composed text, where two laws must not share one.
     made = types.FunctionType(function.__code__, function.__globals__, name, function.__defaults__)
     made.__kwdefaults__ = {**(function.__kwdefaults__ or {}), "parts": parts}
-    made.__qualname__, made.__module__, made.__annotations__ = name, frame.__module__, function.__annotations__
+    made.__qualname__ = name
+    made.__module__ = frame.__module__
+    made.__annotations__ = function.__annotations__
     vars(made)["frame"] = frame
     return made

@@ -45,7 +45,9 @@ _LEAST_HEAT_CAPACITY = 2.5
 
 # First difference [K] of the secants, difference [K] that is none, and how many are tried before a search in the whole
 # table.
-_FIRST_SECANT, _SAME_TEMPERATURE, _MAXIMUM_SECANTS = 1.0e-3, 1.0e-9, 12
+_FIRST_SECANT = 1.0e-3
+_SAME_TEMPERATURE = 1.0e-9
+_MAXIMUM_SECANTS = 12
 
 
 class Passage(NamedTuple):
@@ -261,7 +263,8 @@ def following_rates(table: FluidTable, line: Isobar, supply: ColdSupply, mass: f
     ``mass`` [kg] of gas in the bottle, ``flow`` [kg/s] through the regulator.
     """
     # Mean specific heat over the isobar: which one does not matter for a bound that is cut by a safety factor of ten.
-    wall, temperatures = supply.wall, line.temperatures
+    wall = supply.wall
+    temperatures = line.temperatures
     capacity = (line.enthalpies[-1] - line.enthalpies[0]) / (temperatures[-1] - temperatures[0])
     parts = {"regulator": supply.body, "hose": supply.hose}
     passages = {
@@ -304,8 +307,11 @@ def supply_rates(
 def _content(table: FluidTable, supply: ColdSupply, state: SupplyState, near: float) -> BottleContent:
     """Content of the bottle; the temperature [K] is found by the secant method, starting at ``near``."""
     # A step changes the temperature by little: two or three secants find it without a search in the whole table.
-    mass, volume, energy = state.mass, supply.volume, state.energy
-    before, after = near, near + _FIRST_SECANT
+    mass = state.mass
+    volume = supply.volume
+    energy = state.energy
+    before = near
+    after = near + _FIRST_SECANT
     miss = content_energy(table, mass, volume, before) - energy
     for _ in range(_MAXIMUM_SECANTS):
         next_miss = content_energy(table, mass, volume, after) - energy
@@ -315,5 +321,7 @@ def _content(table: FluidTable, supply: ColdSupply, state: SupplyState, near: fl
         found = after - next_miss * (after - before) / (next_miss - miss)
         if abs(found - after) <= _SAME_TEMPERATURE and table.temperatures[0] < found < table.temperatures[-1]:
             return bottle_content(table, mass, volume, found)
-        before, after, miss = after, found, next_miss
+        before = after
+        after = found
+        miss = next_miss
     return bottle_content(table, mass, volume, content_temperature(table, mass, volume, energy))

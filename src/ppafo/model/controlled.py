@@ -12,8 +12,9 @@ from ppafo.model.columns import larger, smaller
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
 
-TORQUE, ANGLE = "torque", "angle"
-"""Names of the two quantities that other parts of the package treat separately."""
+# Names of the two quantities that other parts of the package treat separately.
+TORQUE = "torque"
+ANGLE = "angle"
 
 
 def controlled(angle: float, pressure_1: float, pressure_2: float, torque: float) -> float:
@@ -158,7 +159,8 @@ class ControlledQuantity:
         if self.name == TORQUE or "N m" not in quantity.unit:
             return quantity
         if quantity.unit == "N m":
-            unit, scale = self.difference, self.size
+            unit = self.difference
+            scale = self.size
         else:
             unit = quantity.unit.replace("(N m)", self.plain_unit).replace("N m", self.plain_unit)
             scale = 1.0 / self.size

@@ -96,11 +96,13 @@ def sine_and_cosine(turns: Numeric) -> tuple[Numeric, Numeric]:
     angle = 2.0 * math.pi * (turns - 0.25 * quarters)
     square = angle * angle
     # Zeros of the shape of the argument, a float or an array.
-    sine, cosine = 0.0 * square, 0.0 * square
+    sine = 0.0 * square
+    cosine = 0.0 * square
     for order in range(_TERMS_OF_SINE, 0, -1):
         sine = (1.0 + sine) * -square / float(2 * order * (2 * order + 1))
         cosine = (1.0 + cosine) * -square / float(2 * order * (2 * order - 1))
-    sine, cosine = angle + angle * sine, 1.0 + cosine
+    sine = angle + angle * sine
+    cosine = 1.0 + cosine
     # Which of the four quarters it is, as signs and shares, which arrays can have one by one.
     is_odd = quarters - 2.0 * np.floor(0.5 * quarters)
     is_later = 0.5 * (quarters - is_odd)

@@ -54,13 +54,15 @@ def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
 def _isentropic_coefficients(heat_capacity_ratio: float) -> Terms:
     """Coefficients for a gas that interpolate the exact function of equation (7) at nodes in the subsonic region."""
     critical_gap = 1.0 - critical_pressure_ratio(heat_capacity_ratio)
-    gaps, values = NODES, NODES
+    gaps = NODES
+    values = NODES
     for index in range(TERMS):
         gap = critical_gap * NODES[index]
         value = isentropic_flow_function(1.0 - gap, heat_capacity_ratio)
         # Divided by the root of the gap, which the curve has as a factor: what is left to fit is smooth at equal
         # pressures.
-        gaps, values = _with_item(gaps, index, gap), _with_item(values, index, value / math.sqrt(gap))
+        gaps = _with_item(gaps, index, gap)
+        values = _with_item(values, index, value / math.sqrt(gap))
     return _polynomial_through(gaps, values)
 
 

@@ -30,13 +30,20 @@ def harmonics(turns: float) -> tuple[Harmonic, ...]:
     """Cosines and sines of 1 to 8 times an angle [turns]."""
     s1, c1 = sine_and_cosine_of_turns(turns)
     # One sine and cosine, and sums of angles: no result waits for more than three products in a row.
-    c2, s2 = c1 * c1 - s1 * s1, 2.0 * s1 * c1
-    c3, s3 = c2 * c1 - s2 * s1, s2 * c1 + c2 * s1
-    c4, s4 = c2 * c2 - s2 * s2, 2.0 * s2 * c2
-    c5, s5 = c4 * c1 - s4 * s1, s4 * c1 + c4 * s1
-    c6, s6 = c3 * c3 - s3 * s3, 2.0 * s3 * c3
-    c7, s7 = c4 * c3 - s4 * s3, s4 * c3 + c4 * s3
-    c8, s8 = c4 * c4 - s4 * s4, 2.0 * s4 * c4
+    c2 = c1 * c1 - s1 * s1
+    s2 = 2.0 * s1 * c1
+    c3 = c2 * c1 - s2 * s1
+    s3 = s2 * c1 + c2 * s1
+    c4 = c2 * c2 - s2 * s2
+    s4 = 2.0 * s2 * c2
+    c5 = c4 * c1 - s4 * s1
+    s5 = s4 * c1 + c4 * s1
+    c6 = c3 * c3 - s3 * s3
+    s6 = 2.0 * s3 * c3
+    c7 = c4 * c3 - s4 * s3
+    s7 = s4 * c3 + c4 * s3
+    c8 = c4 * c4 - s4 * s4
+    s8 = 2.0 * s4 * c4
     return (
         Harmonic(cosine=c1, sine=s1),
         Harmonic(cosine=c2, sine=s2),
@@ -250,7 +257,8 @@ def foot_in_gait(gait: ShankSeries, time: float, angle: float) -> tuple[float, f
     """
     at = harmonics(gait.start + gait.frequency * time)
     shank = value_at(gait.shank, at)
-    own, measured = shank - angle, shank - value_at(gait.ankle, at)
+    own = shank - angle
+    measured = shank - value_at(gait.ankle, at)
     sine, _ = sine_and_cosine_of_turns(own * TURNS_OF_RADIAN + 0.25)
     measured_sine, _ = sine_and_cosine_of_turns(measured * TURNS_OF_RADIAN + 0.25)
     return own + QUARTER_TURN, measured + QUARTER_TURN, gait.toe_lever * (sine - measured_sine)
@@ -260,7 +268,9 @@ def gait_of(leg: LegParameters, now: GaitMeasured) -> GaitNow:
     """Measured gait with the derived quantities for this leg."""
     sine_shank, cosine_shank = sine_and_cosine_of_turns(now.shank * TURNS_OF_RADIAN)
     sine_foot, cosine_foot = sine_and_cosine_of_turns((now.shank - now.ankle) * TURNS_OF_RADIAN + 0.25)
-    load, rate, acceleration = foot_load(leg), now.shank_rate, now.shank_acceleration
+    load = foot_load(leg)
+    rate = now.shank_rate
+    acceleration = now.shank_acceleration
     carried = torque_of_shank(
         load, sine_shank, cosine_shank, sine_foot, cosine_foot, rate, acceleration, now.knee_forward, now.knee_up
     )

@@ -269,7 +269,8 @@ def openings_of(opening: float) -> Openings:
 
 def blended_ports(plant: PlantParameters, openings: Openings) -> tuple[BlendedPort, BlendedPort]:
     """Ports of both chambers for four openings, which may be mean values over a step. Equation (8)."""
-    full, back = plant.valve_conductance, plant.relieving
+    full = plant.valve_conductance
+    back = plant.relieving
     ambient = plant.atmospheric_pressure
     return BlendedPort(
         source_conductance=supply_path(openings.source_1 * full),

@@ -38,7 +38,9 @@ def decay_factors(rate: float, step: float) -> tuple[float, float]:
     # Beyond ARRIVAL exp is 0 to rounding and its mean falls as one over the step: the last line scales it.
     whole = rate * step
     small = -min(whole, ARRIVAL) * SMALLEST_FRACTION
-    term, kept, mean = 1.0, 1.0, 1.0
+    term = 1.0
+    kept = 1.0
+    mean = 1.0
     for order in range(1, TERMS):
         term *= small / order
         kept += term

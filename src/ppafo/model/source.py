@@ -70,7 +70,8 @@ def fluid_pressure(table: FluidTable, temperature: float, density: float) -> flo
 
 def gas_density(table: FluidTable, temperature: float, pressure: float) -> float:
     """Density [kg/m^3] of gas at a temperature [K] and an absolute pressure [Pa], by bisection; at most ``densest``."""
-    low, high = 0.0, densest_gas(table, temperature)
+    low = 0.0
+    high = densest_gas(table, temperature)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         if fluid_pressure(table, temperature, middle) < pressure:
@@ -206,7 +207,8 @@ def content_temperature(table: FluidTable, mass: float, volume: float, energy: f
     The end temperatures of the table for energies outside of its range.
     """
     nodes = table.temperatures
-    below, above = 0, len(nodes) - 1
+    below = 0
+    above = len(nodes) - 1
     miss_below = content_energy(table, mass, volume, nodes[below]) - energy
     miss_above = content_energy(table, mass, volume, nodes[above]) - energy
     if miss_below >= 0.0:
@@ -218,21 +220,30 @@ def content_temperature(table: FluidTable, mass: float, volume: float, energy: f
         middle = (below + above) // 2
         miss = content_energy(table, mass, volume, nodes[middle]) - energy
         if miss <= 0.0:
-            below, miss_below = middle, miss
+            below = middle
+            miss_below = miss
         else:
-            above, miss_above = middle, miss
+            above = middle
+            miss_above = miss
     # False position between two nodes, where the energy is smooth and grows with temperature. An end that stays counts
     # half the next time (the Illinois form), or the root would be approached from one side alone, slowly.
-    low, high, miss_low, miss_high = nodes[below], nodes[above], miss_below, miss_above
+    low = nodes[below]
+    high = nodes[above]
+    miss_low = miss_below
+    miss_high = miss_above
     for _ in range(_MAXIMUM_HALVINGS):
         found = (low * miss_high - high * miss_low) / (miss_high - miss_low)
         miss = content_energy(table, mass, volume, found) - energy
         if abs(miss) <= _NARROW_ENOUGH * abs(miss_high - miss_low) or high - low <= _NARROW_ENOUGH:
             return found
         if miss > 0.0:
-            high, miss_high, miss_low = found, miss, 0.5 * miss_low
+            high = found
+            miss_high = miss
+            miss_low = 0.5 * miss_low
         else:
-            low, miss_low, miss_high = found, miss, 0.5 * miss_high
+            low = found
+            miss_low = miss
+            miss_high = 0.5 * miss_high
     return 0.5 * (low + high)
 
 

@@ -209,7 +209,8 @@ def _rule_line(device: Device, stated: ParameterSet | None, path: str, pair: Seq
     A gauge pressure beside an absolute one would have to be converted.
     """
     unit = declaration.quantities({device.valve_name: device.valve.kind}, device.actuator.kind)[path].unit
-    room, (number, limit) = at(device.supply.atmospheric_pressure, run), (at(each, run) for each in pair)
+    room = at(device.supply.atmospheric_pressure, run)
+    number, limit = (at(each, run) for each in pair)
     if stated is None:
         return rule.format(*(shown_text(each, unit, ".9g", room) for each in (number, limit)))
     entry = stated.numbers[path]

@@ -30,8 +30,9 @@ PLAIN = ("", "1")
 """Units of a plain number."""
 SHORT_NAME = r"^[a-z0-9][a-z0-9_-]{0,99}$"
 """Pattern of the name of a scenario."""
-ANY_KEY, FILLED = r"(?s).*", r"(?s).+"
-"""Patterns of a name that may be any text, and of a text that is not empty."""
+# Patterns of a name that may be any text, and of a text that is not empty.
+ANY_KEY = r"(?s).*"
+FILLED = r"(?s).+"
 FREE_KEY = r"^[A-Za-z0-9_-]+$"
 """Pattern of a free key: a dotted path names it, so a dot or a blank in it would make it another path."""
 IDENTIFIER = r"^[a-z][a-z0-9_]*$"

@@ -17,9 +17,11 @@ from ppafo.model.declaration import PlainFunction
 from ppafo.units import LEVEL, to_si
 
 ATMOSPHERE_PATH = "supply.atmospheric_pressure"
-PRESSURE_PATH, SECOND_PRESSURE_PATH = "supply.pressure", "supply.dorsiflexion_pressure"
+PRESSURE_PATH = "supply.pressure"
+SECOND_PRESSURE_PATH = "supply.dorsiflexion_pressure"
 GAS_PATHS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
-TORQUE_CONSTANT_PATH, DISPLACEMENT_PATH = "actuator.torque_constant", "actuator.displacement_per_radian"
+TORQUE_CONSTANT_PATH = "actuator.torque_constant"
+DISPLACEMENT_PATH = "actuator.displacement_per_radian"
 SAME_PRESSURE = 1.0e-6
 """Relative difference [-] below which two pressures in different units count as equal."""
 _GAUGE = "_g"

@@ -75,7 +75,8 @@ def actuator_departure(model: ActuatorModel, plant: Any) -> LawDeparture:
         for number in (0, 1):
             less = [*pressures]
             more = [*pressures]
-            less[number], more[number] = pressures[number] - push, pressures[number] + push
+            less[number] = pressures[number] - push
+            more[number] = pressures[number] + push
             of_torque = (model.torque(plant, angle, *more) - model.torque(plant, angle, *less)) / (2.0 * push)
             of_volume = (after[number] - before[number]) / (2.0 * turn)
             text = (

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from ppafo.arguments import Name, Overrides, checked
-from ppafo.errors import Faults, ParameterError, PpafoError, UnitError, refused_as
+from ppafo.errors import ParameterError, PpafoError, UnitError, noted_in, raise_noted, refused_as
 from ppafo.model.catalog import EFFECTS, find_effects
 from ppafo.model.effects.kind import SECTION
 from ppafo.model.gas import SPECIES
@@ -38,7 +38,8 @@ from ppafo.parameters.parameter_set import (
 from ppafo.units import SI, split_number
 from ppafo.wording import known_names, nearest_name, one_line
 
-CHOSEN_VALVE, NAMED_VALVE = "valve.", "valves."
+CHOSEN_VALVE = "valve."
+NAMED_VALVE = "valves."
 Forms = Mapping[str, tuple[tuple[str, ...], ...]]
 """Alternative forms of the numbers of a section, each as the names of its values."""
 _ORIFICE = tuple(tuple(quantity.name for quantity in form) for form in (AREA_FORM, SONIC_FORM))
@@ -63,7 +64,7 @@ def read_overrides(texts: Iterable[str], error: type[PpafoError] = ParameterErro
     Raises ``error`` for all other texts, in sorted order.
     """
     in_order = tuple(texts)
-    wrong = Faults()
+    wrong = []
     read = {}
     for text in sorted(in_order):
         on_one_line = one_line(text)
@@ -74,7 +75,7 @@ def read_overrides(texts: Iterable[str], error: type[PpafoError] = ParameterErro
             wrong.append(
                 error(f"override '{on_one_line}' is not of the form PATH=VALUE, for example valve.area=12.6mm^2")
             )
-    wrong.raise_all()
+    raise_noted(wrong)
     return tuple(read[text] for text in in_order)
 
 
@@ -219,12 +220,12 @@ def with_overrides(parameter_set: ParameterSet, overrides: Iterable[Override], v
     # A gas brings numbers, and gauge pressures count from the atmosphere, so these two come first.
     first = [path for path in (SPECIES_PATH, ATMOSPHERE_PATH) if path in overrides_by_path]
     every = {**{path: overrides_by_path[path] for path in first}, **overrides_by_path, **followers}
-    wrong = Faults()
+    wrong: list[PpafoError] = []
     for path, text in every.items():
-        with wrong:
+        with noted_in(wrong):
             change = _with_text if path in (SPECIES_PATH, RELIEVING_PATH) else _with_number
             parameter_set = change(parameter_set, path, text)
-    wrong.raise_all()
+    raise_noted(wrong)
     # A user who gives a pressure in bar reads pressures in bar; a program gives numbers in SI, and reads none.
     typed = {
         path: parameter_set.numbers[path]

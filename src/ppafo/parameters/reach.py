@@ -36,13 +36,15 @@ def torque_reach(device: Device, angle: float, torque: StaticTorque | None = Non
 
     ``torque`` is the ``static_torque`` of the device, for repeated calls.
     """
-    own, (at_lowest, at_highest) = torque or static_torque(device), reaching_pressures(device)
+    own = torque or static_torque(device)
+    at_lowest, at_highest = reaching_pressures(device)
     return own(angle, *at_lowest), own(angle, *at_highest)
 
 
 def reaching_pressures(device: Device) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
     """Return the pressures of both chambers [Pa absolute] at the lowest and highest torque; arrays (runs,) too."""
-    (highest_1, highest_2), vented = device.highest_pressures, device.lowest_pressure
+    highest_1, highest_2 = device.highest_pressures
+    vented = device.lowest_pressure
     of_1 = (highest_1, vented)
     of_2 = (vented, highest_2)
     return (of_1, of_2) if device.supply.is_vacuum else (of_2, of_1)

@@ -75,7 +75,8 @@ def integer_form(scenario: Scenario) -> Scenario:
             f"{', '.join(name.removesuffix(FIXED_POINT) for name in FIXED_LAWS)}"
         )
     scenario.device.check_torque_constant("a fixed-point controller")
-    supply, (bits, pressure_range) = scenario.device.supply, SETTINGS
+    supply = scenario.device.supply
+    bits, pressure_range = SETTINGS
     shown = converter_range(float(supply.pressure), float(supply.dorsiflexion_pressure))
     settings = {**scenario.controller.settings, bits.name: bits.default or 0.0, pressure_range.name: shown}
     return replace(scenario, controller=replace(scenario.controller, kind=f"{kind}{FIXED_POINT}", settings=settings))

@@ -134,7 +134,9 @@ def _typed_row(kind: Any, collector: SourceCollector) -> Row:
 def firmware(scenario: Scenario) -> dict[str, bytes]:
     """Return the firmware files of a controller by name. Raises ScenarioError without an integer form."""
     fixed = fixed_point_controller(scenario)
-    scenario, steps, (top, middle) = fixed.scenario, fixed.steps, fixed.numbers.limits
+    scenario = fixed.scenario
+    steps = fixed.steps
+    top, middle = fixed.numbers.limits
     words = {
         "title": scenario.name,
         "description": in_markdown(scenario.description),

@@ -18,7 +18,8 @@ MOST_PLACES = 30
 """Largest right shift of a 32-bit product [bits]."""
 SHARPENED = int(1.0 / SHARPNESS)
 """Reciprocal of the smallest opening, relative to full opening, with full dead-band compensation [-]."""
-FEWEST_BITS, MOST_BITS = 8, 14
+FEWEST_BITS = 8
+MOST_BITS = 14
 COMMAND_STEPS = 1000
 """Integer command of a full command: half the timer ticks of a proportional valve's pulse."""
 LARGEST_READING: int = 2**MOST_BITS - 1

@@ -16,8 +16,9 @@ from ppafo.storage.files import temporary_folder, write_file
 from ppafo.translation.compiling import asked
 from ppafo.wording import one_line
 
-FLASH, RAM = 2048, 128
-"""Memory of the MSP430F2013 [bytes]."""
+# Memory of the MSP430F2013 [bytes].
+FLASH = 2048
+RAM = 128
 CLOCK = 16.0e6
 """Clock frequency of the board [Hz]."""
 INTERRUPT_STACK = 4

@@ -39,24 +39,33 @@ _UNDER_NAMES = 0.08
 """Space between a legend above all panels and the panels [inches]."""
 _UNBROKEN = "\u00a0"
 """Space at which no line of a title is broken."""
-_LETTERS, _FEWEST_LETTERS, _KIND = 11.0, 24, 1.0
-"""Letters of a title per inch, fewest letters per line, and width of the mark "simulated" [inches]."""
-_ENTRY, _ENTRY_LETTERS = 0.53, 14.5
-"""Width of a legend entry without its label [inches], and letters of a label per inch."""
-_ROW, _ABOVE = 11.0, 6.0
-"""Height of a legend row, and distance from the axes to a title [points]."""
+# Letters of a title per inch, fewest letters per line, and width of the mark "simulated" [inches].
+_LETTERS = 11.0
+_FEWEST_LETTERS = 24
+_KIND = 1.0
+# Width of a legend entry without its label [inches], and letters of a label per inch.
+_ENTRY = 0.53
+_ENTRY_LETTERS = 14.5
+# Height of a legend row, and distance from the axes to a title [points].
+_ROW = 11.0
+_ABOVE = 6.0
 _HIGHEST = 9.4
 """Largest height of a figure [inches]: the height of the text on a page."""
-_EDGES, _NARROWEST = 0.3, 2.4
-"""Width of a figure outside its panels, and least width of a panel beside another, at a font of 10 pt [inches]."""
-_LABEL_LETTERS, _AXIS_ROOM = 13.0, 0.55
-"""Letters of an axis label per inch, and width or height of a panel outside its axes [inches]."""
-_TITLE_SIZE, _SMALLEST_TITLE = 11.0, 0.72
-"""Font size of a title [points], and smallest relative size of a shortened title."""
-_SMALLEST_PLAIN, _LARGEST_PLAIN = 1.0e-4, 1.0e7
-"""Limits of a logarithmic axis whose tick labels are written without an exponent."""
-_ONE_DECADE, _FEW_DECADES = 10.0, 100.0
-"""Ratio of the ends of a horizontal and of any logarithmic axis below which 2 and 5 of every decade have a label."""
+# Width of a figure outside its panels, and least width of a panel beside another, at a font of 10 pt [inches].
+_EDGES = 0.3
+_NARROWEST = 2.4
+# Letters of an axis label per inch, and width or height of a panel outside its axes [inches].
+_LABEL_LETTERS = 13.0
+_AXIS_ROOM = 0.55
+# Font size of a title [points], and smallest relative size of a shortened title.
+_TITLE_SIZE = 11.0
+_SMALLEST_TITLE = 0.72
+# Limits of a logarithmic axis whose tick labels are written without an exponent.
+_SMALLEST_PLAIN = 1.0e-4
+_LARGEST_PLAIN = 1.0e7
+# Ratio of the ends of a horizontal and of any logarithmic axis below which 2 and 5 of every decade have a label.
+_ONE_DECADE = 10.0
+_FEW_DECADES = 100.0
 _TITLE_LINE = 0.2
 """Line height of the title [inches]."""
 

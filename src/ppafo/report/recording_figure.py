@@ -54,7 +54,8 @@ _MAXIMUM_TICKS = 5
 _SMALL_COMMAND = 0.2
 """Command [-] below which the axis does not reach full opening, where a small command would be a flat line."""
 
-_ANGLE, _COMMAND = Kind("Ankle angle", "rad", "angle"), Kind("Valve command (-1 to 1)")
+_ANGLE = Kind("Ankle angle", "rad", "angle")
+_COMMAND = Kind("Valve command (-1 to 1)")
 _COMMAND_THAT_VENTS = Kind("Valve command (-1 to 1; 2 vents both chambers)")
 _LARGEST = 1e9
 """Upper limit of the atmosphere [Pa absolute] and of times [s] in a document."""

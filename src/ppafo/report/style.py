@@ -47,8 +47,9 @@ RESOLUTION = 150
 """Resolution of a PNG file [dots per inch]."""
 FULL_WIDTH = 5.7
 """Width of a figure from which on its font is 10 pt [inches]: 145 mm, the text of a thesis."""
-_SMALLEST_SCALE, _SMALLEST_TEXT = 0.8, 7.0
-"""Smallest font scale relative to a figure of full width (8 pt for 10 pt), and smallest font size [points]."""
+# Smallest font scale relative to a figure of full width (8 pt for 10 pt), and smallest font size [points].
+_SMALLEST_SCALE = 0.8
+_SMALLEST_TEXT = 7.0
 _INCHES_PER_METRE = 1.0 / 0.0254
 _AXES_IN_SPACE = "mpl_toolkits.mplot3d"
 

@@ -14,8 +14,10 @@ UNKNOWN = "\N{EN DASH}"
 _DIGITS = "-0123456789"
 _SUPERSCRIPTS = str.maketrans(_DIGITS, "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SUBSCRIPTS = str.maketrans(_DIGITS, "₋₀₁₂₃₄₅₆₇₈₉")
-_TIMES, _MINUS = "\N{MULTIPLICATION SIGN}", "\N{MINUS SIGN}"
-_APOSTROPHE, _NO_BREAK = "\N{RIGHT SINGLE QUOTATION MARK}", "\N{NO-BREAK SPACE}"
+_TIMES = "\N{MULTIPLICATION SIGN}"
+_MINUS = "\N{MINUS SIGN}"
+_APOSTROPHE = "\N{RIGHT SINGLE QUOTATION MARK}"
+_NO_BREAK = "\N{NO-BREAK SPACE}"
 _QUOTED = "\N{LEFT DOUBLE QUOTATION MARK}\\1\N{RIGHT DOUBLE QUOTATION MARK}"
 _PRESSURE_UNITS = {"Pa_a": "Pa (absolute)", "Pa_d": "Pa", "psi_g": "psig", "psi_a": "psia", "psi_d": "psi"}
 _POWER_OF_TEN = re.compile(r"(?<=\d)e([+-]?\d+)\b")

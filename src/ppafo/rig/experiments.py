@@ -37,18 +37,23 @@ from ppafo.storage.owned_folder import entries_of, read_json
 from ppafo.version import __version__
 from ppafo.wording import argument_text, known_names, one_line
 
-RIG_FILE, _RIG_FORMAT = "rig.json", "ppafo rig"
-"""File with all true values beside the recordings of a folder, and its format."""
+# File with all true values beside the recordings of a folder, and its format.
+RIG_FILE = "rig.json"
+_RIG_FORMAT = "ppafo rig"
 NOTICE = "synthetic: made by the simulated test bench of ppafo in place of a measurement"
 """Notice in the metadata of every recording of the simulated bench."""
 
-_STEP, _HIGHEST, _TURN = 5.0 * PASCALS_PER_PSI, 95.0 * PASCALS_PER_PSI, 115.0 * PASCALS_PER_PSI
-"""Step and largest pressure difference [Pa] of static torque, and the one at which pressure begins to fall."""
+# Step and largest pressure difference [Pa] of static torque, and the one at which pressure begins to fall.
+_STEP = 5.0 * PASCALS_PER_PSI
+_HIGHEST = 95.0 * PASCALS_PER_PSI
+_TURN = 115.0 * PASCALS_PER_PSI
 _UPSTREAM_GAUGE = tuple(level * PASCALS_PER_PSI for level in (20.0, 35.0, 50.0, 65.0, 80.0))
 _PRESSURE_RATIOS = (0.3, 0.4, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 0.98)
 """Upstream gauge pressures [Pa] at the open valve, and ratios of downstream to upstream pressure [-]."""
-_READING_INTERVAL, _LEAK_RATE, _SMALL_METER = 2.0, 20.0, 0.1
-"""Time between readings at rest [s], sample rate of vane-leak [Hz], range of the meter of its flow over the other's."""
+# Time between readings at rest [s], sample rate of vane-leak [Hz], range of the meter of its flow over the other's.
+_READING_INTERVAL = 2.0
+_LEAK_RATE = 20.0
+_SMALL_METER = 0.1
 _NOTHING = 1.0e-9
 """Torque constant [m^3] of a device without gas torque, and diameter [m] of plugged ports."""
 SENSORS = {

@@ -43,11 +43,14 @@ _SHARE_THAT_DIFFERS = 0.5
 """Largest fraction of distinct values [-] in a signal with a visible converter step."""
 _BY_CHANCE = 8.0
 """Significance of correlated noise: four standard errors of the quartile of differences, times root of count."""
-_LONGEST_WINDOW, _SHORTEST_WINDOW = 4, 12
-"""Longest windows for the noise, as parts of a recording, and the shortest [samples]."""
-_LASTING, _GROWING, _MOST_MEMORY = 0.3, 1.25, 1.4
-"""Fraction of the spread in a window that noise has in one of half the length, usual growth from there, and largest
-growth by the memory of noise [-]."""
+# Longest windows for the noise, as parts of a recording, and the shortest [samples].
+_LONGEST_WINDOW = 4
+_SHORTEST_WINDOW = 12
+# Fraction of the spread in a window that noise has in one of half the length, usual growth from there, and largest
+# growth by the memory of noise [-].
+_LASTING = 0.3
+_GROWING = 1.25
+_MOST_MEMORY = 1.4
 
 
 @dataclass(frozen=True, slots=True)

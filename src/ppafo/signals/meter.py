@@ -8,16 +8,20 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-WALK, REQUESTED, LED_SHANK = "walk", "requested torque", "shank of a gait"
-"""Requirements of metrics besides channels: walk, requested torque, shank led by a gait."""
+# Requirements of metrics besides channels: walk, requested torque, shank led by a gait.
+WALK = "walk"
+REQUESTED = "requested torque"
+LED_SHANK = "shank of a gait"
 SAME_LEVEL = 1.0e-9
 """Largest difference of equal levels of a reference, relative to its largest value [-]."""
 SLOW_RATE = 0.75
 """Largest rate of a slow reference, relative to its largest value [1/s]: a lag behind it is within the largest one."""
 START_UP = 1.0
 """Time for a value to meet a repeated reference and to settle [s], at most half of the run."""
-SHORTEST_REST, SHORTEST_SHARE, FEWEST_OF_REST = 0.1, 0.1, 2.0
-"""Length of the shortest stretch [s] or, if that is less, divided by the run's [-]; and its least number of samples."""
+# Length of the shortest stretch [s] or, if that is less, divided by the run's [-]; and its least number of samples.
+SHORTEST_REST = 0.1
+SHORTEST_SHARE = 0.1
+FEWEST_OF_REST = 2.0
 
 
 class FootSample(NamedTuple):

@@ -12,7 +12,7 @@ from typing import Any
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.kind import ControllerKind
-from ppafo.errors import Faults, ParameterError, ScenarioError, refused_as
+from ppafo.errors import ParameterError, PpafoError, ScenarioError, noted_in, raise_noted, refused_as
 from ppafo.model.catalog import VALVES
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
@@ -156,16 +156,17 @@ def build_scenario(reading: DocumentReader) -> Scenario:
     """
     document = reading.document
     kind = kind_at(reading.document, "controller")
-    law, (origin, links) = CONTROLLERS[kind], read_hardware(reading)
+    law = CONTROLLERS[kind]
+    origin, links = read_hardware(reading)
     device = read_device(reading, origin, links)
     # Refusals are in the units of the set.
     with shown_in(device.shown):
-        wrong = Faults()
-        with wrong:
+        wrong = list[PpafoError]()
+        with noted_in(wrong):
             duration, step, output_interval, period = read_clock(reading)
-        with wrong:
+        with noted_in(wrong):
             of_sensors = reading.section("sensors", SENSORS)
-        with wrong:
+        with noted_in(wrong):
             controlled = controlled_in(document)
             if law.needs_reference and controlled not in law.controls:
                 able = ", ".join(name for name, other in CONTROLLERS.items() if controlled in other.controls)
@@ -176,9 +177,9 @@ def build_scenario(reading: DocumentReader) -> Scenario:
                 follows = f"follows a reference of {follows}, not {controlled}; {remedy}"
                 raise reading.refusal(path, f"the controller '{kind}' {follows}")
             reference, reference_links = _reference(reading, controlled, device.supply.atmospheric_pressure)
-        with wrong:
+        with noted_in(wrong):
             initial, initial_links = _initial(reading, device)
-        wrong.raise_all()
+        raise_noted(wrong)
         tolerance = reading.number("run.tolerance", ACCURACY)
         section = MOTIONS[kind_at(document, "motion")].section
         assert section is not None, "walks are built from another layout"

@@ -29,8 +29,10 @@ SHORTER = 4
 """Factor by which the finer run shortens the steps; its allowed error is smaller by the square of this factor."""
 MARGIN = 1.5
 """Safety factor on the change: the estimate then exceeds the error in 99 % of drawn runs (docs/evidence.md)."""
-LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE, LARGEST_OF_TEMPERATURE = 2.0e-4, 1.0e-3, 2.0e-3
-"""Default error limits relative to the ranges of angle and pressures, and to the gas temperature [-]."""
+# Default error limits relative to the ranges of angle and pressures, and to the gas temperature [-].
+LARGEST_OF_ANGLE = 2.0e-4
+LARGEST_OF_PRESSURE = 1.0e-3
+LARGEST_OF_TEMPERATURE = 2.0e-3
 SMALLEST_TOLERANCE = 1.0e-6
 """Smallest ``run.tolerance`` [-] that a scenario may have."""
 SMALLEST_TRIED = 0.01
@@ -41,7 +43,9 @@ MOVE = 1.0e-7
 ALLOWED_CHANGE = 1.0e-3
 """Largest change of a metric that is ignored, as a fraction of its value or of the range of its quantity."""
 
-FINER, MOVED_START, MOVED_MEASUREMENT = "finer steps", "start moved", "measurement moved"
+FINER = "finer steps"
+MOVED_START = "start moved"
+MOVED_MEASUREMENT = "measurement moved"
 _PERTURBATIONS = frozenset({MOVED_START, MOVED_MEASUREMENT})
 
 DRAWS = 4

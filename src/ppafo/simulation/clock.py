@@ -25,7 +25,8 @@ _RELATIVE = 1.0e-9
 _DURATION, _STEP, _OUTPUT = RUN
 _LONGEST_STEP = 1.0e-3
 _DURATION_PATH, _STEP_PATH, _OUTPUT_PATH = (f"run.{item.name}" for item in RUN)
-RATE_PATH, PERIOD_PATH = "controller.rate", "controller.period"
+RATE_PATH = "controller.rate"
+PERIOD_PATH = "controller.period"
 TIMES = (_DURATION_PATH, _STEP_PATH, _OUTPUT_PATH, RATE_PATH, PERIOD_PATH)
 """Paths that decide the clock of a run."""
 

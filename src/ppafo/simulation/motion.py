@@ -66,7 +66,8 @@ from ppafo.simulation.vane_recording import measured_vane
 from ppafo.units.shown import shown_text
 from ppafo.wording import one_line
 
-_PROFILE, _SHANK = "motion.profile", "motion.shank"
+_PROFILE = "motion.profile"
+_SHANK = "motion.shank"
 
 
 def contradictions(scenario: Scenario) -> Iterator[Contradiction]:

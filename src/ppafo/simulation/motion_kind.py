@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     from ppafo.model.columns import Problem
     from ppafo.signals.recording import Recording
 
-VANE, WALK = "vane", "walk"
-"""File layouts of a vane alone and of a walking leg; the walking motion is also named ``walk``."""
+# File layouts of a vane alone and of a walking leg; the walking motion is also named ``walk``.
+VANE = "vane"
+WALK = "walk"
 VANE_MOTIONS = ("free", "locked", "prescribed", "leg")
 """Motions of a vane alone in this package."""
 _GROUP = "ppafo.motions"

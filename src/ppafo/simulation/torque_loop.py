@@ -144,7 +144,8 @@ def shaped_at(settings: Any, stops: Range, around: Surroundings, angle: float, *
     )
     gauge_1 = gauge_of(around.supply_pressure, room)
     gauge_2 = gauge_of(around.dorsiflexion_pressure, room)
-    half_1, half_2 = room + 0.5 * gauge_1, room + 0.5 * gauge_2
+    half_1 = room + 0.5 * gauge_1
+    half_2 = room + 0.5 * gauge_2
     filled = parts.chambers(plant, angle, half_1, half_2)
     vented = parts.torque(plant, angle, room, room)
     # By virtual work a chamber grows with the angle as its torque does with the pressure.
@@ -164,7 +165,8 @@ def chambers_of(actuator: Actuator) -> PlainFunction:
     """Return the function of an actuator's settings, stops, surroundings and angle [rad] that gives its chambers."""
     if actuator.kind == VANE:
         return vane_at
-    model, name = ACTUATORS[actuator.kind].model, actuator.kind
+    model = ACTUATORS[actuator.kind].model
+    name = actuator.kind
     shape = (
         made_of(measured_shape_of, f"shape_of_{name}", _MeasuredParts(model.prepare, actuator.table))
         if actuator.table is not None
@@ -259,7 +261,8 @@ class LoopParts:
         same = {name: group for name, group in kept.items() if not set(varied).intersection(self.reads[name])}
 
         def of_run(*numbers: float) -> list[Any]:
-            own, of_own = {**settings, **dict(zip(varied, numbers, strict=True))}, dict(same)
+            own = {**settings, **dict(zip(varied, numbers, strict=True))}
+            of_own = dict(same)
             return [self.group(name, own, of_own) for name in groups]
 
         return over_combinations(of_run, *map(present, varied)) if varied else ([alone], None)
@@ -279,7 +282,8 @@ class LoopLink(Link):
 
     def without_gap(self, present: Callable[[str], Any], computed: dict[Any, Any]) -> Any:
         """Return the default without its gap; ``computed`` keeps groups for all links to them."""
-        key, function = (self.parts, self.groups), self.function
+        key = (self.parts, self.groups)
+        function = self.function
         assert function is not None, "groups are arguments of a function"
         if key not in computed:
             computed[key] = self.parts.combinations(self.groups, present)

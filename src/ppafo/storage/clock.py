@@ -172,7 +172,8 @@ def _ordinal(word: str, order: DateOrder) -> int | None:
         )
         if len(months) != 1 or len(numbers) != 2:
             return None
-        month, (day, year) = months[0], numbers
+        month = months[0]
+        day, year = numbers
     try:
         return date(year + 2000 if year < 100 else year, month, day).toordinal()
     except ValueError:

@@ -18,8 +18,9 @@ from ppafo.wording import reason
 LEFT_ASIDE = ".writing-"
 """Part of the temporary name of a file; such a file remains only from a killed process."""
 
-_CURRENT_FOLDER, _EXCHANGE = -100, 2
-"""Constants ``AT_FDCWD`` and ``RENAME_EXCHANGE`` of Linux."""
+# Constants ``AT_FDCWD`` and ``RENAME_EXCHANGE`` of Linux.
+_CURRENT_FOLDER = -100
+_EXCHANGE = 2
 
 MAXIMUM_BYTES_RECORDED = 2_000_000_000
 """Largest size of a recording file [bytes]; an hour at 1 kHz with twenty channels is smaller, even as text."""

@@ -37,8 +37,10 @@ _DAMAGED = (OSError, KeyError, RuntimeError, TypeError, ValueError, OverflowErro
 """Exceptions that h5py raises for a truncated or damaged file."""
 _KINDS_OF_NUMBERS = frozenset("fiu")
 """NumPy kind codes of floats, signed and unsigned integers."""
-_GZIP, _SHUFFLE, _FLETCHER = 1, 2, 3
-"""HDF5 filter numbers of gzip, byte shuffling and the Fletcher checksum."""
+# HDF5 filter numbers of gzip, byte shuffling and the Fletcher checksum.
+_GZIP = 1
+_SHUFFLE = 2
+_FLETCHER = 3
 _SUPPORTED_FILTERS = frozenset({_GZIP, _SHUFFLE, _FLETCHER})
 
 _BYTES_OF_A_FLOAT = 8

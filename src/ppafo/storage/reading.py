@@ -38,7 +38,8 @@ def recording_of_frame(frame: Any, atmosphere: float = STANDARD_ATMOSPHERE) -> R
     Time is a column, the index, or the coordinate of a Dataset; gauge pressures are relative to ``atmosphere`` [Pa
     absolute]. Raises DataError for a table without time, a column without unit and a cell that is no finite number.
     """
-    attributes, (header, named) = dict(frame.attrs), _named_columns(frame)
+    attributes = dict(frame.attrs)
+    header, named = _named_columns(frame)
     title = str(attributes.get("title", "")) or "table"
     kind = str(attributes.get("kind", "measured"))
     values = [_numbers(name, np.asarray(column)) for name, column in named]

@@ -21,8 +21,9 @@ _MAXIMUM_SECONDS = 30.0
 """Time limit for reading a file [s], including the start of a process on a busy computer."""
 _BYTES_PER_SECOND = 5e6
 """Reading rate of a slow disk [bytes/s], which extends the time limit of large files."""
-REFUSED, OUT_OF_MEMORY = 76, 77
-"""Exit codes: invalid file, with one line of explanation on the output; and excessive memory."""
+# Exit codes: invalid file, with one line of explanation on the output; and excessive memory.
+REFUSED = 76
+OUT_OF_MEMORY = 77
 _ALWAYS_ALLOWED = 400_000_000
 """Memory that reading may take for a file of any size [bytes]."""
 

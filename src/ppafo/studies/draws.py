@@ -27,8 +27,9 @@ from ppafo.simulation.scenario import LARGEST_SEED, Scenario, sensor_noise
 from ppafo.studies.distributions import Distribution, Floats
 from ppafo.studies.study import RandomValue, SamplingPlan, Study, with_followers
 
-FEWEST_DRAWS, MAXIMUM_DRAWS = 32, 2**26
-"""Limits of the number of draws: two per replicate, and the largest number with balanced Sobol replicates."""
+# Limits of the number of draws: two per replicate, and the largest number with balanced Sobol replicates.
+FEWEST_DRAWS = 32
+MAXIMUM_DRAWS = 2**26
 # Few enough that each keeps the evenness of a Sobol sequence, enough for Student's interval (2.13 for 95 %).
 REPLICATES = 16
 """Number of independent scrambles of the Sobol sequence to which draws are assigned in turn."""

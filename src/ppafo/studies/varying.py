@@ -28,8 +28,9 @@ _OFFSET_UNITS = ("degC", "°C")
 DEVIATIONS_IN_HALF_WIDTH = 1.959963984540054
 """Half width of the 95 % interval of a normal distribution, in standard deviations."""
 _STATED_DIFFERENCES = {"psi_g": "psi_d", "psi_a": "psi_d", "degC": "K", "°C": "K"}
-_SMALLEST_SHOWN, _LARGEST_SHOWN = 1.0e-3, 1.0e7
-"""Range of magnitudes that are displayed in the unit in which they were given."""
+# Range of magnitudes that are displayed in the unit in which they were given.
+_SMALLEST_SHOWN = 1.0e-3
+_LARGEST_SHOWN = 1.0e7
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,9 +19,10 @@ MAXIMUM_RUNS_OF_CHUNK = 65_536
 """Largest number of runs of a chunk, unless the study sets another number."""
 _FEWEST_RUNS_OF_CHUNK = 512
 """Smallest number of runs of a chunk when its size is reduced to limit memory or time."""
-_CHUNKS_OF_SMALL_STUDY, _FEWEST_STEPS = 16, 2**22
-"""Number of chunks of each configuration of a small study, so that an interrupt loses little, and smallest number of
-time steps of a full chunk, which keeps the processors busy: some tenths of a second to some seconds."""
+# Number of chunks of each configuration of a small study, so that an interrupt loses little, and smallest number of
+# time steps of a full chunk, which keeps the processors busy: some tenths of a second to some seconds.
+_CHUNKS_OF_SMALL_STUDY = 16
+_FEWEST_STEPS = 2**22
 _MAXIMUM_STEPS = 2**25
 """Largest number of time steps, summed over runs, between two progress reports: some seconds of processor time."""
 _FIRST_RUNS_OF_CHUNK = 64

@@ -34,16 +34,21 @@ Rows = dict[str, NDArray[Any]]
 """Columns of one length, as ``run_judged`` returns them."""
 Evaluation = Callable[[Mapping[str, Floats]], Rows]
 """Function from columns of varied values to rows."""
-_BLOCKS, _FEWEST_OF_BLOCK = 64, 256
-"""Number of blocks in which runs are submitted to an executor, and smallest number of runs of a block."""
-FAILED, OVER_TIME = "failed", "_over_time"
-"""Name of the column of failed runs, and suffix of the name of a column with a trace."""
-OSCILLATES, FOLLOWS = "oscillates", "follows"
-"""Names of the columns of the verdict on a run beside ``ON_PURPOSE``: the loop oscillates; it follows its reference."""
-_AT_ONCE, _SLOW_AT_ONCE = 16_384, 32
-"""Largest number of runs between two progress reports: in general, and with a Python controller."""
-_FIRST_AT_ONCE, _BETWEEN_REPORTS = 1024, 3.0
-"""Largest number of runs of the first part, and target time of later parts [s]."""
+# Number of blocks in which runs are submitted to an executor, and smallest number of runs of a block.
+_BLOCKS = 64
+_FEWEST_OF_BLOCK = 256
+# Name of the column of failed runs, and suffix of the name of a column with a trace.
+FAILED = "failed"
+OVER_TIME = "_over_time"
+# Names of the columns of the verdict on a run beside ``ON_PURPOSE``: the loop oscillates; it follows its reference.
+OSCILLATES = "oscillates"
+FOLLOWS = "follows"
+# Largest number of runs between two progress reports: in general, and with a Python controller.
+_AT_ONCE = 16_384
+_SLOW_AT_ONCE = 32
+# Largest number of runs of the first part, and target time of later parts [s].
+_FIRST_AT_ONCE = 1024
+_BETWEEN_REPORTS = 3.0
 _BETWEEN_COUNTS = 1.0
 """Smallest time between two reports of the runs that ended within a part [s]."""
 

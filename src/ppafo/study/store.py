@@ -50,7 +50,9 @@ from ppafo.wording import argument_text
 if TYPE_CHECKING:
     import pyarrow as pa
 
-STUDY_COPY, FORMAT, SCHEMA_VERSION = "study.toml", "ppafo study results", 3
+STUDY_COPY = "study.toml"
+FORMAT = "ppafo study results"
+SCHEMA_VERSION = 3
 _MAXIMUM_BYTES_OF_DOCUMENT = 100_000_000
 """Largest document that is read [bytes]; documents of studies are far smaller."""
 _LONGEST_WRITING = 86400.0
@@ -62,13 +64,17 @@ _PLAIN = "-"
 """Unit of a dimensionless column."""
 ASKED_ABOVE = 10_000_000_000
 """Size [bytes] above which a study only starts with ``--yes``."""
-_FIXED_BYTES_OF_ROW, _BYTES_OF_NUMBER, _BYTES_OF_SAMPLE, _BYTES_OF_FILE = 3, 8, 4, 12_000
-"""Bytes of the texts of a row, each stored as an index into a list of texts, per number of a row, per sample of a trace
-(in single precision unless needed for bands), and of a chunk file and its note beside its rows."""
+# Bytes of the texts of a row, each stored as an index into a list of texts, per number of a row, per sample of a
+# trace (in single precision unless needed for bands), and of a chunk file and its note beside its rows.
+_FIXED_BYTES_OF_ROW = 3
+_BYTES_OF_NUMBER = 8
+_BYTES_OF_SAMPLE = 4
+_BYTES_OF_FILE = 12_000
 DIGITS = 16
 """Number of hexadecimal digits kept of a SHA-256 hash."""
-_DEEPEST, _LONGEST = 12, 64
-"""Largest nesting depth of settings, and number of elements up to which a list is stored itself and not its hash."""
+# Largest nesting depth of settings, and number of elements up to which a list is stored itself and not its hash.
+_DEEPEST = 12
+_LONGEST = 64
 
 
 def controller_document(controller: PythonController) -> dict[str, Any]:

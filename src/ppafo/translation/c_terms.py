@@ -57,7 +57,9 @@ _LEVELS = {"or": 2, "and": 3, **dict.fromkeys(("<", "<=", ">", ">=", "==", "!=")
 PART = "ppafo_part"
 """C name of the helper function that slices an array along the first index."""
 # Levels of precedence of C, as far as terms have them.
-_CHOICE, _SIGN, _ATOM = 1, 10, 11
+_CHOICE = 1
+_SIGN = 10
+_ATOM = 11
 _ARITHMETIC = frozenset({"+", "-", "*", "&", "|", "^", ">>", "min", "max", "choice", "negative"})
 _HELPERS = {
     "min": "ppafo_smaller",

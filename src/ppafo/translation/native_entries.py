@@ -22,7 +22,8 @@ PACKED = "_packed"
 """Name suffix of a library entry that takes its arrays in one block (``ppafo_array``, ``prelude.h``)."""
 ROUNDS_AS_WRITTEN = "ppafo_rounds_as_written"
 """Name of the library function that returns 1 if every operation is rounded separately."""
-_NO_FLOATS, _FLOATS = ctypes.c_double * 0, np.dtype(np.float64)
+_NO_FLOATS = ctypes.c_double * 0
+_FLOATS = np.dtype(np.float64)
 _NUMBERS: dict[str, Any] = {FLOAT: ctypes.c_double, INT: ctypes.c_int64}
 
 

@@ -62,7 +62,8 @@ class Scopes:
                 within |= names
                 for name, count in inner_changes.items():
                     changes[name] = changes.get(name, 0) + count
-            self.direct[id(statement)], self.inside[id(statement)] = own, within
+            self.direct[id(statement)] = own
+            self.inside[id(statement)] = within
             every |= within
         self.changes[id(body)] = changes
         return every, changes

@@ -11,9 +11,12 @@ class Scalar:
     name: str
 
 
-BOOL, INT, FLOAT = Scalar("bool"), Scalar("int"), Scalar("float")
-INT16, INT32 = Scalar("int16"), Scalar("int32")
-"""Integer types of small processors, assigned by ``widths`` only."""
+BOOL = Scalar("bool")
+INT = Scalar("int")
+FLOAT = Scalar("float")
+# Integer types of small processors, assigned by ``widths`` only.
+INT16 = Scalar("int16")
+INT32 = Scalar("int32")
 _ORDER = (BOOL, INT, FLOAT)
 
 

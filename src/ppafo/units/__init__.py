@@ -34,7 +34,8 @@ from ppafo.units.spelling import split_pressure_kind as split_pressure_kind
 
 SI = "SI"
 """Unit of a number that is in SI units already, for any quantity; written by programs."""
-LEVEL, DIFFERENCE = "Pa_a", "Pa_d"
+LEVEL = "Pa_a"
+DIFFERENCE = "Pa_d"
 KINDS = {"g": "a gauge pressure", "a": "an absolute pressure", "d": "a pressure difference"}
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _NOT_ZERO = re.compile(r"[^eE]*[1-9]", re.ASCII)

@@ -61,8 +61,10 @@ _NAMES = [prefix + unit for prefix in ("", *_PREFIX.split("|")) for unit in UNIT
 """Names of all units with all prefixes; written in capitals, 'MM' is more often a small unit than a large one."""
 DECIMALS = decimal.Context(prec=28, rounding=decimal.ROUND_HALF_EVEN)
 """Decimal context of unit arithmetic, independent of the settings of a host program."""
-_PRESSURE, _MOLAR_MASS = {"[mass]": 1, "[length]": -1, "[time]": -2}, {"[mass]": 1, "[substance]": -1}
-MASS_FLOW, _VOLUME_FLOW = {"[mass]": 1, "[time]": -1}, {"[length]": 3, "[time]": -1}
+_PRESSURE = {"[mass]": 1, "[length]": -1, "[time]": -2}
+_MOLAR_MASS = {"[mass]": 1, "[substance]": -1}
+MASS_FLOW = {"[mass]": 1, "[time]": -1}
+_VOLUME_FLOW = {"[length]": 3, "[time]": -1}
 _LONGEST = 60
 _FACTOR = r"[A-Za-z]+(?:_[gad])?(?:\^-?[1-9])?"
 _PRODUCT = rf"{_FACTOR}(?: {_FACTOR})*"
@@ -96,7 +98,8 @@ _SPELLINGS = [
 _FORCES = re.compile(r"(lb|oz) (in|ft)|(in|ft) (lb|oz)|(lb|kg)(/(?:in|ft|cm|mm)\^2)")
 """Spellings in which pound, ounce or kilogram is a force."""
 _FEW = sorted(UNITS, key=len)
-_FIRST, _NEXT = rf"((?:{_PREFIX})?(?:{'|'.join(_FEW[::-1])}))", rf"((?:{_PREFIX})??(?:{'|'.join(_FEW)}))"
+_FIRST = rf"((?:{_PREFIX})?(?:{'|'.join(_FEW[::-1])}))"
+_NEXT = rf"((?:{_PREFIX})??(?:{'|'.join(_FEW)}))"
 _JOINED = re.compile(rf"{_FIRST}(?!\1){_NEXT}(?:(?!\1|\2){_NEXT}(?:(?!\1|\2|\3){_NEXT})?)?")
 """Two to four joined units, each of them once.
 

@@ -148,12 +148,12 @@ _DIFFERENCE = 0.02
 """Step of a finite difference as a fraction of the distance between two trial magnitudes [-]."""
 _FINE_DIFFERENCE = 0.002
 """The same after a step that made the error worse [-]: a valve may have switched once more, which is no slope."""
-_BEST, _OF_BEST, _OF_RISING = 6, 2, 4
-"""Number of candidates that are nearest after the steps of all, and their further Gauss-Newton steps.
-
-Of these a candidate takes up to four more while each gains more than separates two causes: else a true cause that is
-not yet at its best would lose to one that explains almost as much.
-"""
+# Number of candidates that are nearest after the steps of all, and their further Gauss-Newton steps. Of these a
+# candidate takes up to four more while each gains more than separates two causes: else a true cause that is not yet
+# at its best would lose to one that explains almost as much.
+_BEST = 6
+_OF_BEST = 2
+_OF_RISING = 4
 _SHORTER = 0.35
 """Length of a step divided by that of one that went too far [-]."""
 _SMALL = 0.1

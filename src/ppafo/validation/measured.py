@@ -77,7 +77,8 @@ def read_measured(
         if mapped is None or place.is_dir():
             recording = read_recording(place, atmosphere=atmosphere)
         else:
-            (column_map, map_name), gas = mapped, f"{device.gas.molar_mass!r} kg/mol"
+            column_map, map_name = mapped
+            gas = f"{device.gas.molar_mass!r} kg/mol"
             recording = read_foreign(place, column_map, atmosphere, map_name, gas)
         content = read_bytes(place / NETCDF_FILE if place.is_dir() else place)
     return check_recording(recording, device, file, hashlib.sha256(content).hexdigest())

@@ -10,8 +10,11 @@ from ppafo.simulation.recorded.usual_errors import ANGLE_ERRORS, PRESSURE_ERRORS
 from ppafo.units import parse_quantity, split_quantity
 from ppafo.wording import known_names, one_line
 
-ANGLE, PRESSURE_1, PRESSURE_2 = "angle", "pressure_1", "pressure_2"
-PRESSURE_DIFFERENCE, TORQUE = "pressure_difference", "torque"
+ANGLE = "angle"
+PRESSURE_1 = "pressure_1"
+PRESSURE_2 = "pressure_2"
+PRESSURE_DIFFERENCE = "pressure_difference"
+TORQUE = "torque"
 ACCEPTABLE_FRACTION = 0.03
 """Largest RMS error of an acceptable model as a fraction of the full range [-].
 

@@ -17,8 +17,9 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of
 from ppafo.walking.wearer import Wearer
 
-SHORTEST_FIRST, LONGEST_FIRST = 0.5, 2.0
-"""Limits of the expected time of the first stride, in strides of the gait."""
+# Limits of the expected time of the first stride, in strides of the gait.
+SHORTEST_FIRST = 0.5
+LONGEST_FIRST = 2.0
 
 
 class _Pair(NamedTuple):

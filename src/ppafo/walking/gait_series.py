@@ -20,17 +20,20 @@ from ppafo.signals.recording import Floats
 from ppafo.walking.preparation import rocker_on_heel
 from ppafo.walking.wearer import HeelRocker, Wearer
 
-FLAT_FROM, FLAT_TO = 0.15, 0.35
-"""Phases [strides] between which the foot stands flat; the angle of the flat foot is taken from this interval."""
+# Phases [strides] between which the foot stands flat; the angle of the flat foot is taken from this interval.
+FLAT_FROM = 0.15
+FLAT_TO = 0.35
 
-USUAL_HEEL_RISE, LATEST_HEEL_RISE = 0.6, 0.95
-"""Fraction of the stance at which the heel rises: default if the angles do not show it, and upper limit."""
+# Fraction of the stance at which the heel rises: default if the angles do not show it, and upper limit.
+USUAL_HEEL_RISE = 0.6
+LATEST_HEEL_RISE = 0.95
 
 EVENT_PHASES = np.linspace(0.0, 1.0, 1001)[150:]
 """Phases [strides] at which events are searched, from the first flat foot on."""
 
-CLEARANCE_FROM, CLEARANCE_TO = 0.2, 0.9
-"""Fractions of the swing between which the toes must clear the ground."""
+# Fractions of the swing between which the toes must clear the ground.
+CLEARANCE_FROM = 0.2
+CLEARANCE_TO = 0.9
 
 ANKLE_HEIGHT_FRACTION = 0.039 / 0.246
 """Ankle height above the sole divided by shank length; both are given as fractions of the stature in figure 4.1 of

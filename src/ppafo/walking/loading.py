@@ -44,8 +44,9 @@ from ppafo.wording import argument_text
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 DEFAULT_PERIOD = 1.0e-3
 """Default sample period of the controller [s]."""
-DEFAULT_DURATION, BOTTLE_DURATION = 60.0, 600.0
-"""Default duration of a walk [s], and of a walk on a bottle, which may end it earlier."""
+# Default duration of a walk [s], and of a walk on a bottle, which may end it earlier.
+DEFAULT_DURATION = 60.0
+BOTTLE_DURATION = 600.0
 
 
 def build_walk(reading: DocumentReader) -> Scenario:

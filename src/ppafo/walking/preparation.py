@@ -21,8 +21,9 @@ from ppafo.model.sensors import GaitSensors
 from ppafo.simulation.plan import WHOLE, StepCounts
 from ppafo.walking.wearer import HeelRocker
 
-LOWEST_ANGLE, HIGHEST_ANGLE = math.radians(60.0), math.radians(115.0)
-"""Range of the ankle angle in walking [rad]; the time step is chosen for the chambers in this range."""
+# Range of the ankle angle in walking [rad]; the time step is chosen for the chambers in this range.
+LOWEST_ANGLE = math.radians(60.0)
+HIGHEST_ANGLE = math.radians(115.0)
 
 STEPS_PER_FILLING = 15.0
 """Steps per filling time of the smallest chamber: at 1 kHz metrics are accurate to 1 % (docs/decisions/0008)."""

@@ -44,7 +44,8 @@ SCALED_MASS = (0.6, 1.7)
 About the 2nd to the 98th percentile of adults for a subject in their middle: 45 to 120 kg for 72 kg. Children do not
 only have less mass but walk differently.
 """
-STATURE, BODY_MASS = "wearer.stature", "wearer.body_mass"
+STATURE = "wearer.stature"
+BODY_MASS = "wearer.body_mass"
 
 
 class HeelRocker(NamedTuple):
@@ -226,7 +227,8 @@ def who_walks(wearer: Wearer, gait: Gait, origin: str) -> str:
     said = f"wearer: {wearer.body_mass:.4g} kg, {origin}"
     default_stature = gait.stature if is_subject else None
     if abs(wearer.stature - (default_stature or _PAPER.stature)) > _SAME * wearer.stature:
-        (low, high), tall = STATURES, wearer.stature
+        low, high = STATURES
+        tall = wearer.stature
         beyond = "" if low <= tall <= high else f" in the proportions of adults of {low:g} to {high:g} m, extrapolated"
         said += f"; {tall:.4g} m tall, segments scaled by mass and stature{beyond}; curves of the gait are not scaled"
     elif wearer.shank_mass == _PAPER.shank_mass and abs(wearer.body_mass / _PAPER.body_mass - 1.0) > _SAME:

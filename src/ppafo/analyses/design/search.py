@@ -50,20 +50,23 @@ Limit = Literal["torque", "flow", "control", "pressure"]
 """Limit of a valve's pressure, which falls with more torque, a larger opening, a loop that follows, pressure.lowest."""
 PRESSURE = Kind("Supply pressure", "Pa_a", "pressure", ".3g")
 TORQUE = Kind("Torque", "N m", "torque", ".3g")
-ERROR, GAS = "rms_error", "gas_supplied"
+ERROR = "rms_error"
+GAS = "gas_supplied"
 OSCILLATES = "the torque loop oscillates"
 _OPENINGS = ("valve.area", "valve.sonic_conductance")
 
 Numbers = Mapping[str, float]
 """Numbers of a valve by path [SI]."""
-STREAMS, _SEED = 16, 1
-"""Noise streams of each trial if sensors are noisy, and their seed: the same for all trials and pressures."""
+# Noise streams of each trial if sensors are noisy, and their seed: the same for all trials and pressures.
+STREAMS = 16
+_SEED = 1
 SCALES = (1.0, 8.0, 64.0, 0.125, 0.015625)
 """Common factors [-] on the combinations of gain factors, tried in turn: a slow valve needs other gains for a task."""
 _AT_ONCE = 16_384
 """Number of runs of a batch: enough to occupy all threads with little memory."""
-GRID, FINENESS = 17, 0.1 * PASCALS_PER_PSI
-"""Supply pressures that are tried in each round of the search, and tolerance [Pa] of the lowest feasible one."""
+# Supply pressures that are tried in each round of the search, and tolerance [Pa] of the lowest feasible one.
+GRID = 17
+FINENESS = 0.1 * PASCALS_PER_PSI
 WIDER = (2.0, 4.0, 16.0)
 """Factors [-] on the valve opening that show whether the flow is the limit."""
 NEAR_CEILING = 1.2
@@ -73,8 +76,9 @@ LAGS = {f"valve.{name}" for name in _MOVES_LATE}
 """Numbers of a valve that moves late or slowly; at 0 it moves at once."""
 LEAST_PEAK = 0.7
 """Required share of the peak torque [-]: the RMS error over a mostly zero stride alone would accept half the peak."""
-MORE_PRESSURE, OPENINGS = 1.1, (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.1, 0.05)
-"""Factor on the gauge pressure for the flow margin, and fractions of the opening tried in turn [-]."""
+# Factor on the gauge pressure for the flow margin, and fractions of the opening tried in turn [-].
+MORE_PRESSURE = 1.1
+OPENINGS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.1, 0.05)
 REACHED = 0.95
 """Fraction of a peak torque from which it counts as reached [-]."""
 _WHOLE_PEAK = 0.005
@@ -276,8 +280,10 @@ class Trials:
             self.failures.update(result.reasons.values())
             self.failures += Counter({OSCILLATES: int(np.count_nonzero(oscillates))})
         trial = np.empty(count, TRIAL)
-        trial["pressure"], trial["gains"] = pressure, gains
-        trial["error"], trial["gas"] = error.max(axis=0), gas.mean(axis=0) / problem.simulated
+        trial["pressure"] = pressure
+        trial["gains"] = gains
+        trial["error"] = error.max(axis=0)
+        trial["gas"] = gas.mean(axis=0) / problem.simulated
         trial["works"] = (trial["error"] <= problem.largest_error) & (pressure >= peak_pressure(problem))
         return trial
 
@@ -642,10 +648,8 @@ def _pressure_panels(sizing: Sizing) -> list[Panel]:
     gases = list[Mark]()
     rings = list[Mark]()
     for sized in sizing.valves:
-        (pressure, error, gas), colour = (
-            (sized.tried[name] for name in ("pressure", "error", "gas")),
-            colours[sized.name],
-        )
+        pressure, error, gas = (sized.tried[name] for name in ("pressure", "error", "gas"))
+        colour = colours[sized.name]
         keeps = error <= limit
         errors.append(Mark("line", pressure, error, (), sized.name, colour, dotted))
         if keeps.any():

@@ -26,8 +26,9 @@ GasUses = Annotated[
 ]
 _STRIDE_TIME = 1.1
 """Default stride time [s]."""
-_BETWEEN_RESTS, _SHORTEST = 600.0, 1.0
-"""Default walking time between two rests, and shortest walking and simulated time [s]."""
+# Default walking time between two rests, and shortest walking and simulated time [s].
+_BETWEEN_RESTS = 600.0
+_SHORTEST = 1.0
 MAXIMUM_INTERVALS = 2000
 """Largest number of walking and resting intervals, which are integrated one by one."""
 

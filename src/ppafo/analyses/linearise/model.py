@@ -50,8 +50,10 @@ EQUILIBRIUM = "equilibrium"
 VALVE = "valve_"
 """Prefix of the names of valve states."""
 _OPENINGS = (f"{VALVE}requested", f"{VALVE}opening")
-_SUPPLIES, _MOTION = ("supply_pressure", "dorsiflexion_pressure"), ("angle", "angular_velocity")
-_PRESSURES, _TEMPERATURES = ("pressure_1", "pressure_2"), ("temperature_1", "temperature_2")
+_SUPPLIES = ("supply_pressure", "dorsiflexion_pressure")
+_MOTION = ("angle", "angular_velocity")
+_PRESSURES = ("pressure_1", "pressure_2")
+_TEMPERATURES = ("temperature_1", "temperature_2")
 UNITS = {
     "angle": "rad",
     "angular_velocity": "rad/s",
@@ -65,19 +67,24 @@ UNITS = {
 _SIGNALS = ("states", "inputs", "outputs")
 _SIZES = {"Pa": 1.0e5, "K": 300.0}
 """Reference size of values by unit [SI], else 1: for steps of differences, and to compare slopes and rates."""
-_ON_THE_EDGE, _ZERO = 1.0e-6, 1.0e-9
-"""Slope over the largest of its row: above the first, a difference of both sides is a kink (of the smooth, about 1e-9);
-below the second, a slope is 0."""
-_LONGEST, _SHORTER, _LENGTHS, _ORDERS = 1.0e-2, 4.0, 8, 5
-"""Longest step of a difference over the reference size, ratio of steps, their number, and orders extrapolated [-]."""
+# Slope over the largest of its row: above the first, a difference of both sides is a kink (of the smooth, about
+# 1e-9); below the second, a slope is 0.
+_ON_THE_EDGE = 1.0e-6
+_ZERO = 1.0e-9
+# Longest step of a difference over the reference size, ratio of steps, their number, and orders extrapolated [-].
+_LONGEST = 1.0e-2
+_SHORTER = 4.0
+_LENGTHS = 8
+_ORDERS = 5
 _STEADY = 1.0e-9
 """Largest time derivative divided by the size of the state [1/s] that counts as zero."""
 PID_LAWS = ("pid", "pid_feedforward")
 """Controllers whose feedback is a PID: their loop is linear while the command is not clipped."""
 _INTEGRATOR = 1.0e-6
 """Magnitude [1/s] up to which a pole counts as an integrator."""
-_INTERVAL, _SHARES = 1.0e-3, tuple(np.geomspace(3.0e-4, 0.3, 13).tolist())
-"""Sample time [s] of runs after a step of the command, and the steps divided by the steady command: three decades."""
+# Sample time [s] of runs after a step of the command, and the steps divided by the steady command: three decades.
+_INTERVAL = 1.0e-3
+_SHARES = tuple(np.geomspace(3.0e-4, 0.3, 13).tolist())
 _DASHED = {"linestyle": "--"}
 
 
@@ -537,7 +544,8 @@ def model_at(scenario: Scenario, run: Run, values: Mapping[str, float], time: fl
         )
         return np.stack([one_sided_slopes(*each) for each in ends], axis=-1)
 
-    (near, near_errors), (far, far_errors) = slopes(1.0), slopes(-1.0)
+    near, near_errors = slopes(1.0)
+    far, far_errors = slopes(-1.0)
     # A second chamber that the actuator lacks stays at the atmosphere, without any slope. A value that the valve takes
     # from its command at once is no state: only the output that shows it needs it.
     needing = np.count_nonzero((near != 0.0) | (far != 0.0), axis=0)

@@ -191,7 +191,8 @@ def load_publication(name_or_path: str | Path) -> tuple[Claim, ...]:
         if entry.computation not in COMPUTATIONS:
             known = known_names(entry.computation, COMPUTATIONS)
             raise ScenarioError(f"{where}.computation: '{entry.computation}' is unknown{known}")
-        (low, high), stated = claim.limits, entry.published
+        low, high = claim.limits
+        stated = entry.published
         if low == -math.inf and high == math.inf:
             raise ScenarioError(f"{where}: give at_least, at_most or both, the range in which the claim holds")
         if low > high:

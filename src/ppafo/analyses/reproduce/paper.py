@@ -41,7 +41,9 @@ from ppafo.wording import count_of
 
 STEP, SOLENOID, PROPORTIONAL = EXPERIMENTS = ("step-response", "torque-task-solenoid", "torque-task-proportional")
 """Shipped scenarios of the paper's experiments."""
-REPORTED_SET, PLANTED_SET, RIG_SEED = "ppafo2011-printed", "ppafo2011", 1
+REPORTED_SET = "ppafo2011-printed"
+PLANTED_SET = "ppafo2011"
+RIG_SEED = 1
 BENCH_PRESET = "paper-bench"
 """Preset of a bench similar to the paper's, for figures 3 and 7."""
 TASK_PRESET = "ideal-laboratory"
@@ -64,8 +66,9 @@ _RESOLUTION = 1.0e-6
 """Smallest fraction of the travel that counts as motion in a simulated recording; measured recordings need more."""
 _SAME_ANGLE = 0.5
 """Tolerance for the first and last angle of figure 7 [deg]."""
-_CLEAR, _SAME = 0.05, 0.01
-"""Fractions of the pressure range: smallest clear change, and tolerance for a level that is reached or kept."""
+# Fractions of the pressure range: smallest clear change, and tolerance for a level that is reached or kept.
+_CLEAR = 0.05
+_SAME = 0.01
 _NOTABLE_TIME = 2.0
 """Shortest time [ms] between a full chamber 1 and breakaway that is noted as a difference."""
 _SLOWED = 0.5
@@ -392,7 +395,8 @@ def step_observations(recording: Recording, supply: Supply) -> list[Claim]:
     if events is None:
         statements = (name for name, entry in entries.items() if entry.computation == "figure_7")
         return [_observed(name, False, "the vane does not move from rest to rest") for name in statements]
-    (start, stop), observed = events, list[Claim]()
+    start, stop = events
+    observed = list[Claim]()
     # Gauge pressures [psi], and times [ms].
     time = 1e3 * recording.time
     angle = np.degrees(recording["angle"])

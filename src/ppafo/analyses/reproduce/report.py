@@ -48,11 +48,13 @@ TORQUE_FIGURE = "figure-8-torque-task"
 
 _MILLISECONDS = 1.0e3
 _AFTER_STEP = Kind("Time after the step", "ms")
-_TORQUE, _ERROR = Kind("Torque", "N m", "torque"), Kind("Error", "N m", "torque")
+_TORQUE = Kind("Torque", "N m", "torque")
+_ERROR = Kind("Error", "N m", "torque")
 _GAS = Kind("CO$_2$", "kg", "gas mass")
-_SHOWN_BEFORE_STEP, _SHOWN_AFTER_STOP = 0.03, 0.8
-"""Fractions of the time axis before the step, where the rise within the first milliseconds stays visible, and of the
-time until the stop that is shown after the stop, when the vane rests."""
+# Fractions of the time axis before the step, where the rise within the first milliseconds stays visible, and of the
+# time until the stop that is shown after the stop, when the vane rests.
+_SHOWN_BEFORE_STEP = 0.03
+_SHOWN_AFTER_STOP = 0.8
 _ENLARGED = 40.0
 """Time after the step that is shown enlarged [ms]."""
 _BIN = 3.0

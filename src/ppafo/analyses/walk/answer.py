@@ -34,8 +34,10 @@ _PRESSURE, _TORQUE, _GAS = (ask.Kind(quantity=name, form=".3g") for name in ("pr
 _SHARE, _WARMTH, _BOTTLE_PRESSURE = (
     ask.Kind(quantity=name, form=".0f") for name in ("fraction", "temperature", "pressure")
 )
-_WORK, _PERCENT = ask.Kind("", "J", "energy", ".3g"), ask.Kind("", "1", "fraction", ".2g")
-_ANGLE, _HEIGHT = ask.Kind("", "rad", "angle", ".3g"), ask.Kind("", "m", "length", ".2g")
+_WORK = ask.Kind("", "J", "energy", ".3g")
+_PERCENT = ask.Kind("", "1", "fraction", ".2g")
+_ANGLE = ask.Kind("", "rad", "angle", ".3g")
+_HEIGHT = ask.Kind("", "m", "length", ".2g")
 _NUMBERS = {
     "body_mass": ("Body mass of the wearer", "mass", 1),
     "gas": ("Gas per stride", "gas mass", 3),
@@ -226,7 +228,8 @@ def _remedied(worn: WalkResult, drags: bool) -> list[str]:
     """
     if walk_of(worn.scenario).bottle is not None:
         return []
-    (cause, remedies, advice), whole = _trials(worn, drags), worn.scenario.run.duration
+    cause, remedies, advice = _trials(worn, drags)
+    whole = worn.scenario.run.duration
     for overrides in remedies:
         with suppress(PpafoError):
             # Toes may sink from stride to stride: the whole walk decides.

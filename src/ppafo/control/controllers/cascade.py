@@ -146,7 +146,8 @@ def cascade_update(
     open. The part of the breakaway torque beyond the static friction is moved to the load.
     """
     error = reference - measurement.angle
-    is_begun, is_running = min(state.started, 1.0), max(state.started - 1.0, 0.0)
+    is_begun = min(state.started, 1.0)
+    is_running = max(state.started - 1.0, 0.0)
     turned = (measurement.angle - state.angle) * is_begun
     rate = state.rate + (turned - period * state.rate) / (period + parameters.rate_filter)
     asked = (reference - state.reference) / period * is_begun

@@ -68,8 +68,10 @@ def damped_update(
     The rate is a backward difference over the period [s] through a filter of first order. Damping acts on the rate of
     the torque, not of the error, so that a step of the reference gives no kick. The command compensates the dead band.
     """
-    gains, ahead = parameters.gains, learnt_command(parameters, state.elapsed)
-    wanted, torque = parts.steered(reference), parts.steered(seen_value(measurement, parts=parts))
+    gains = parameters.gains
+    ahead = learnt_command(parameters, state.elapsed)
+    wanted = parts.steered(reference)
+    torque = parts.steered(seen_value(measurement, parts=parts))
     change = (torque - state.torque) * state.started
     # Implicit, as in the PID: a filter of 0 s is the plain difference.
     slope = state.slope + (change - period * state.slope) / (period + gains.damping_filter)

@@ -91,8 +91,10 @@ def torque_rates(
     least = min(nominal.dead_volume_1, nominal.dead_volume_2)
     volume_1 = chamber_1_volume(angle, nominal.angle_min, nominal.displacement_per_radian, nominal.dead_volume_1)
     volume_2 = chamber_2_volume(angle, nominal.angle_max, nominal.displacement_per_radian, nominal.dead_volume_2)
-    volume_1, volume_2 = max(volume_1, least), max(volume_2, least)
-    ratio, valve = nominal.critical_ratio, nominal.valve_conductance
+    volume_1 = max(volume_1, least)
+    volume_2 = max(volume_2, least)
+    ratio = nominal.critical_ratio
+    valve = nominal.valve_conductance
     leak = ellipse_flow(pressure_1, pressure_2, nominal.leak_conductance, ratio)
     # A check valve: gas does not go back into a supply that has less.
     feed_1 = max(ellipse_flow(nominal.supply_pressure, pressure_1, valve, ratio), 0.0)
@@ -143,7 +145,8 @@ def feedforward_update(
     # Along the reference, with the other chamber vented, not at the measured state: the feed-forward must not see the
     # noise.
     nominal = parameters.nominal
-    ambient, above = nominal.atmospheric_pressure, reference / nominal.torque_constant
+    ambient = nominal.atmospheric_pressure
+    above = reference / nominal.torque_constant
     pressure_1 = min(ambient + max(above, 0.0), NEARLY_SUPPLY * nominal.supply_pressure)
     pressure_2 = min(ambient + max(-above, 0.0), NEARLY_SUPPLY * nominal.dorsiflexion_pressure)
     rates = torque_rates(nominal, measurement.angle, 0.0, pressure_1, pressure_2)

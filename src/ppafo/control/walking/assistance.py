@@ -134,7 +134,8 @@ def requested_torque(rules: Assistance, phase: PhaseState, angle: float, rate: f
     """
     fraction = phase.since_strike / phase.stride_time
     hold = rules.stiffness * (rules.swing_angle - angle) - rules.damping * rate
-    landing, swing = profile_torque(rules.landing, fraction), profile_torque(rules.swing, fraction)
+    landing = profile_torque(rules.landing, fraction)
+    swing = profile_torque(rules.swing, fraction)
     lands = phase.phase == LANDING
     # Profiles of landing and swing are given as torques in dorsiflexion, hence the minus.
     lifted = hold - (landing if lands else swing)

@@ -82,7 +82,8 @@ def law_that_walks_update(
     parts: _WalkingParts,
 ) -> tuple[float, LawState]:
     """Command from -1 to 1, or ``VENT``, and the next state; the reference is not used."""
-    heel, toe = measurement.heel_force, measurement.toe_force
+    heel = measurement.heel_force
+    toe = measurement.toe_force
     phase = phases.next_phase_state(parameters.phases, state.phase, heel, toe, period)
     request = assistance.next_request(parameters.assistance, state.request, phase, measurement.angle, period)
     # Before the update: what the law remembers of another task must not act on this one.

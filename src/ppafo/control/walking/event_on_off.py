@@ -62,7 +62,8 @@ def update(
     period: float,
 ) -> tuple[float, _EventOnOffState]:
     """Command [-]: 1 plantarflexion, -1 dorsiflexion, ``VENT`` for free motion; the reference is not used."""
-    heel, toe = measurement.heel_force, measurement.toe_force
+    heel = measurement.heel_force
+    toe = measurement.toe_force
     phase = phases.next_phase_state(parameters.phases, state.phase, heel, toe, period)
     above = measurement.angle > parameters.swing_angle + parameters.band
     below = measurement.angle < parameters.swing_angle - parameters.band

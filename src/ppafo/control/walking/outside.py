@@ -32,7 +32,8 @@ def outside_update(
     parameters: OutsideParameters, state: OutsideState, reference: float, measurement: GaitMeasurement, period: float
 ) -> tuple[float, OutsideState]:
     """Command as given, and the next phase and request; the reference is not used."""
-    heel, toe = measurement.heel_force, measurement.toe_force
+    heel = measurement.heel_force
+    toe = measurement.toe_force
     phase = phases.next_phase_state(parameters.phases, state.phase, heel, toe, period)
     request = assistance.next_request(parameters.assistance, state.request, phase, measurement.angle, period)
     return state.command, OutsideState(phase, request, state.command)

@@ -209,7 +209,8 @@ def depart_at(
     way = direction_of(departure.angular_velocity) if moving else way
     duration = step * (1.0 - departure.fraction) * (1.0 - waits)
     velocity = departure.angular_velocity
-    sliding, damping = friction.in_motion, plant.viscous_damping
+    sliding = friction.in_motion
+    damping = plant.viscous_damping
     first = net_torque(start_torque, way, sliding, damping, departure.angle, velocity) / plant.inertia
     expected = velocity + duration * first
     net = net_torque(next_torque, way, sliding, damping, departure.angle, expected)

@@ -101,7 +101,9 @@ class Flows(NamedTuple):
 
 def flow_rates(flowing: GasFlows) -> Flows:
     """Rates of all masses [kg/s] from the flows through ports and leakage. Equation (9)."""
-    in_1, in_2, leak = flowing.in_1, flowing.in_2, flowing.leak
+    in_1 = flowing.in_1
+    in_2 = flowing.in_2
+    leak = flowing.leak
     return Flows(
         mass_1=in_1.total - leak,
         mass_2=in_2.total + leak,

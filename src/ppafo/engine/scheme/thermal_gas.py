@@ -113,9 +113,12 @@ def upstream_roots(gas: WarmGas, flowing: GasFlows, turns_1: float, turns_2: flo
     assumes. A matrix that is too steep damps this error; a matrix that is too flat lets the error grow from step to
     step.
     """
-    root_1, root_2 = math.sqrt(gas.content_1 / gas.mass_1), math.sqrt(gas.content_2 / gas.mass_2)
-    in_1, in_2 = flowing.in_1, flowing.in_2
-    vent_1, vent_2 = in_1.total - in_1.from_source, in_2.total - in_2.from_source
+    root_1 = math.sqrt(gas.content_1 / gas.mass_1)
+    root_2 = math.sqrt(gas.content_2 / gas.mass_2)
+    in_1 = flowing.in_1
+    in_2 = flowing.in_2
+    vent_1 = in_1.total - in_1.from_source
+    vent_2 = in_2.total - in_2.from_source
     return PathRatios(
         source_1=1.0 if in_1.from_source >= 0.0 else root_1,
         vent_1=max(1.0, root_1) if abs(vent_1) < turns_1 else (1.0 if vent_1 >= 0.0 else root_1),
@@ -139,8 +142,10 @@ def enthalpy_ratios(thermal: ThermalParameters, roots: PathRatios) -> PathRatios
 
 def carried(flowing: GasFlows, by: PathRatios) -> GasFlows:
     """Flows [kg/s], each times the ratio of its path."""
-    in_1, in_2 = flowing.in_1, flowing.in_2
-    fed_1, fed_2 = in_1.from_source * by.source_1, in_2.from_source * by.source_2
+    in_1 = flowing.in_1
+    in_2 = flowing.in_2
+    fed_1 = in_1.from_source * by.source_1
+    fed_2 = in_2.from_source * by.source_2
     return GasFlows(
         PortFlow(fed_1 + (in_1.total - in_1.from_source) * by.vent_1, fed_1),
         PortFlow(fed_2 + (in_2.total - in_2.from_source) * by.vent_2, fed_2),
@@ -150,8 +155,10 @@ def carried(flowing: GasFlows, by: PathRatios) -> GasFlows:
 
 def carried_slopes(flowing: SlopedFlows, by: PathRatios) -> SlopedFlows:
     """Flows whose derivatives are those of what each path carries; their temperature is constant."""
-    to_1, to_2 = flowing.slopes_1, flowing.slopes_2
-    fed_1, fed_2 = to_1.from_source * by.source_1, to_2.from_source * by.source_2
+    to_1 = flowing.slopes_1
+    to_2 = flowing.slopes_2
+    fed_1 = to_1.from_source * by.source_1
+    fed_2 = to_2.from_source * by.source_2
     return SlopedFlows(
         flowing.flows,
         PortSlopes(fed_1 + (to_1.total - to_1.from_source) * by.vent_1, fed_1),
@@ -253,7 +260,8 @@ def thermal_matrix(
     step: float,
 ) -> ThermalMatrix:
     """Matrix of a step [s] with an energy balance."""
-    ratio, weight = thermal.heat_capacity_ratio, GAMMA * step
+    ratio = thermal.heat_capacity_ratio
+    weight = GAMMA * step
     room_1 = at.volume_1 * (1.0 + at.give_1)
     room_2 = at.volume_2 * (1.0 + at.give_2)
     per_content_1, per_content_2 = pressures_per_mass(plant.gas_product, room_1, room_2)
@@ -266,10 +274,12 @@ def thermal_matrix(
     by_energy = linearise(per_content_1, per_content_2, carried_slopes(flowing, enthalpy_ratios(thermal, roots)), step)
     cooling_1 = weight * thermal.wall_exchange * at.volume_1 / gas.mass_1
     cooling_2 = weight * thermal.wall_exchange * at.volume_2 / gas.mass_2
-    wall_1, wall_2 = cooling_1 * gas.content_1 / gas.mass_1, cooling_2 * gas.content_2 / gas.mass_2
+    wall_1 = cooling_1 * gas.content_1 / gas.mass_1
+    wall_2 = cooling_2 * gas.content_2 / gas.mass_2
     work_1 = weight * (ratio - 1.0) * at.growth_1 / (at.volume_1 * (1.0 + ratio * at.give_1))
     work_2 = weight * (ratio - 1.0) * at.growth_2 / (at.volume_2 * (1.0 + ratio * at.give_2))
-    kept_1, kept_2 = kept_share(ratio, at.give_1), kept_share(ratio, at.give_2)
+    kept_1 = kept_share(ratio, at.give_1)
+    kept_2 = kept_share(ratio, at.give_2)
     # The masses are eliminated first: they respond to the contents alone, so that a 2 by 2 matrix is left.
     return ThermalMatrix(
         a=1.0 - kept_1 * (1.0 - by_energy.a - cooling_1 + wall_1 * (1.0 - by_mass.a)) + work_1,

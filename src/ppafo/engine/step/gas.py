@@ -56,7 +56,8 @@ def begin_still(parts: Program, lane: Lane, length: float) -> None:
     scale = inverse_determinant(linear.a, linear.b, linear.c, linear.d)
     first = solve_stage(linear, scale, flow_rates(lane.flowing.flows))
     # Pressures as in a step with moving volumes: a locked joint has the bits of an exported plant at rest.
-    mass_1, mass_2 = lane.state.mass_1 + length * first.mass_1, lane.state.mass_2 + length * first.mass_2
+    mass_1 = lane.state.mass_1 + length * first.mass_1
+    mass_2 = lane.state.mass_2 + length * first.mass_2
     ended = lane.state._replace(mass_1=mass_1, mass_2=mass_2)
     end_1, end_2 = parts.functions.held_pressures(lane.plant, lane.held, ended)
     lane.gas_stage = GasStage(linear=linear, scale=scale, first=first, drift=STILL, end_1=end_1, end_2=end_2)
@@ -67,7 +68,8 @@ def begin_moving(parts: Program, lane: Lane, next_angle: float, length: float) -
 
     Mass responds to pressure in proportion to ``V + p dV/dp``: a compliant chamber takes up more gas.
     """
-    plant, state = lane.plant, lane.state
+    plant = lane.plant
+    state = lane.state
     pressure_1, pressure_2 = parts.actuator.pressures(plant, state.angle, state.mass_1, state.mass_2)
     # Volumes at both angles at one pressure: the drift is what the angle alone does.
     here = parts.actuator.chambers(plant, state.angle, pressure_1, pressure_2)
@@ -85,21 +87,26 @@ def begin_moving(parts: Program, lane: Lane, next_angle: float, length: float) -
     )
     scale = inverse_determinant(linear.a, linear.b, linear.c, linear.d)
     first = solve_stage(linear, scale, added_flows(flow_rates(lane.flowing.flows), drift))
-    mass_1, mass_2 = state.mass_1 + length * first.mass_1, state.mass_2 + length * first.mass_2
+    mass_1 = state.mass_1 + length * first.mass_1
+    mass_2 = state.mass_2 + length * first.mass_2
     end_1, end_2 = parts.actuator.pressures(plant, next_angle, mass_1, mass_2)
     lane.gas_stage = GasStage(linear=linear, scale=scale, first=first, drift=drift, end_1=end_1, end_2=end_2)
 
 
 def begin_warm(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
     """Set the first stage with an energy balance; volumes change linearly up to ``next_angle`` [rad]."""
-    plant, state, rate = lane.plant, lane.state, 1.0 / max(length, SHORTEST)
-    angle, functions = state.angle, parts.functions
+    plant = lane.plant
+    state = lane.state
+    rate = 1.0 / max(length, SHORTEST)
+    angle = state.angle
+    functions = parts.functions
     pressure_1, pressure_2 = parts.actuator.pressures(plant, angle, state.mass_1, state.mass_2)
     at = warm_chambers(plant, pressure_1, pressure_2, angle, angle, next_angle, rate, parts=functions)
     held = WarmGas(state.mass_1, state.mass_2, lane.masses.mass_1, lane.masses.mass_2)
     linear = thermal_matrix(plant, lane.thermal, held, at, lane.flowing, length)
     # A growing volume lowers the pressure as a loss of content at this rate would.
-    lost_1, lost_2 = -state.mass_1 * at.growth_1 / at.volume_1, -state.mass_2 * at.growth_2 / at.volume_2
+    lost_1 = -state.mass_1 * at.growth_1 / at.volume_1
+    lost_2 = -state.mass_2 * at.growth_2 / at.volume_2
     flows = thermal_flows(lane.thermal, held, at, lane.flowing.flows)
     scale = inverse_determinant(linear.a, linear.b, linear.c, linear.d)
     first_rates = solve_thermal_stage(
@@ -151,7 +158,8 @@ def change(parts: Program, lane: Lane, length: float) -> None:
 
 def change_warm(parts: Program, lane: Lane, length: float) -> None:
     """Set the second stage and the changes of gas with an energy balance."""
-    begun, rates = lane.gas_stage, lane.gas_stage.first
+    begun = lane.gas_stage
+    rates = lane.gas_stage.first
     flows = thermal_flows(lane.thermal, begun.gas, begun.at, lane.passing)
     drift = thermal_response(begun.linear, begun.lost_1, begun.lost_2)
     right = ThermalFlows(
@@ -164,7 +172,8 @@ def change_warm(parts: Program, lane: Lane, length: float) -> None:
     second = solve_thermal_stage(begun.linear, begun.scale, right)
     kept_1, kept_2 = kept_gas(lane.plant, rates.gas, second.gas, length)
     carries = enthalpy_flow_ratio(1.0, lane.thermal.heat_capacity_ratio)
-    warm_1, warm_2 = kept_1 * carries, kept_2 * carries
+    warm_1 = kept_1 * carries
+    warm_2 = kept_2 * carries
     lane.second = second
     lane.change = ThermalFlows(
         mass_1=of_both_stages(rates.mass_1, second.mass_1, length) + begun.linear.kept_1 * warm_1,
@@ -186,7 +195,8 @@ def error(parts: Program, lane: Lane, ahead: float, length: float) -> float:
     begun = lane.gas_stage
     if parts.is_thermal:
         added = solve_thermal_stage(begun.linear, begun.scale, added_thermal_flows(begun.first, lane.second))
-        missed_1, missed_2 = added.mass_1, added.mass_2
+        missed_1 = added.mass_1
+        missed_2 = added.mass_2
         # The temperature over the reference is content over mass: what a little of both changes it by.
         held = begun.gas
         warmer_1 = (added.mass_1 - held.content_1 / held.mass_1 * added.gas.mass_1) / held.mass_1
@@ -195,7 +205,8 @@ def error(parts: Program, lane: Lane, ahead: float, length: float) -> float:
     else:
         refused_1, refused_2 = kept_gas(lane.plant, begun.first, lane.second, 1.0)
         damped = solve_stage(begun.linear, begun.scale, added_flows(begun.first, lane.second))
-        missed_1, missed_2 = abs(damped.mass_1) + refused_1, abs(damped.mass_2) + refused_2
+        missed_1 = abs(damped.mass_1) + refused_1
+        missed_2 = abs(damped.mass_2) + refused_2
         least = 0.0
     pressed = pressure_error(
         lane.plant, OF_STAGES, missed_1, missed_2, begun.end_1, begun.end_2, ahead, length, parts=parts.functions
@@ -212,7 +223,8 @@ def shift_error(parts: Program, lane: Lane, shift: float, ahead: float, length: 
     begun = lane.gas_stage
     response_1 = (begun.linear.a - 1.0) * begun.first.mass_1
     response_2 = (begun.linear.d - 1.0) * begun.first.mass_2
-    weight, functions = OF_OPENING * shift, parts.functions
+    weight = OF_OPENING * shift
+    functions = parts.functions
     return pressure_error(
         lane.plant, weight, response_1, response_2, begun.end_1, begun.end_2, ahead, length, parts=functions
     )
@@ -230,7 +242,9 @@ def move(parts: Program, lane: Lane, state: PlantState, assumed: float, reached:
     """Return the state for the angle reached [rad] instead of the assumed one [rad], with thermal gas isentropic."""
     if not parts.is_thermal:
         return state
-    plant, ratio, chambers = lane.plant, lane.thermal.heat_capacity_ratio, parts.functions.chambers
+    plant = lane.plant
+    ratio = lane.thermal.heat_capacity_ratio
+    chambers = parts.functions.chambers
     pressure_1, pressure_2 = parts.functions.pressures(plant, assumed, state.mass_1, state.mass_2)
     before = chambers(plant, assumed, pressure_1, pressure_2)
     turned = chambers(plant, reached, pressure_1, pressure_2)
@@ -243,8 +257,10 @@ def move(parts: Program, lane: Lane, state: PlantState, assumed: float, reached:
     )
     after = chambers(plant, reached, reached_1, reached_2)
     half = 0.5 * (ratio - 1.0)
-    mean_1, mean_2 = 0.5 * (after.volume_1 + before.volume_1), 0.5 * (after.volume_2 + before.volume_2)
-    work_1, work_2 = half * (after.volume_1 - before.volume_1), half * (after.volume_2 - before.volume_2)
+    mean_1 = 0.5 * (after.volume_1 + before.volume_1)
+    mean_2 = 0.5 * (after.volume_2 + before.volume_2)
+    work_1 = half * (after.volume_1 - before.volume_1)
+    work_2 = half * (after.volume_2 - before.volume_2)
     return state._replace(
         mass_1=state.mass_1 * (mean_1 - work_1) / (mean_1 + work_1),
         mass_2=state.mass_2 * (mean_2 - work_2) / (mean_2 + work_2),

@@ -49,13 +49,16 @@ def with_line(slopes: PortSlopes, ratio: float) -> PortSlopes:
 
 def after(parts: Program, lane: Lane, taken_1: float, taken_2: float, inlet_rise: float, length: float) -> LineStep:
     """Return both lines after ``length`` [s], as ``step_lines``; the supply pressures of the plant are those set."""
-    set_1, set_2, product = lane.plant.supply_pressure, lane.plant.dorsiflexion_pressure, lane.plant.gas_product
+    set_1 = lane.plant.supply_pressure
+    set_2 = lane.plant.dorsiflexion_pressure
+    product = lane.plant.gas_product
     return step_lines(lane.lines, set_1, set_2, product, lane.line_state, taken_1, taken_2, inlet_rise, length)
 
 
 def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
     """Set the first stage of the step, with chambers and lines solved together."""
-    state, ratio = lane.state, lane.thermal.heat_capacity_ratio if parts.is_thermal else 1.0
+    state = lane.state
+    ratio = lane.thermal.heat_capacity_ratio if parts.is_thermal else 1.0
     pressure_1, pressure_2 = parts.actuator.pressures(lane.plant, state.angle, state.mass_1, state.mass_2)
     here = parts.actuator.chambers(lane.plant, state.angle, pressure_1, pressure_2)
     # A compliant chamber takes more gas for a rise of its pressure, and gas from a line brings more energy than mass.

@@ -144,10 +144,12 @@ def reference_origin(parts: Program, lane: Lane) -> float:
 
 def begin_reference_summary(parts: Program, lane: Lane, interval: float, last_index: int) -> None:
     """Set the last value of the reference and the larger distance of its ends from the origin, without a hold."""
-    first, last = reference_of_sample(parts, lane, 0, interval), reference_of_sample(parts, lane, last_index, interval)
+    first = reference_of_sample(parts, lane, 0, interval)
+    last = reference_of_sample(parts, lane, last_index, interval)
     origin = reference_origin(parts, lane)
     largest = max(abs(first - origin), abs(last - origin))
-    start_up, duration = 0.0, last_index * interval * lane.timing.step
+    start_up = 0.0
+    duration = last_index * interval * lane.timing.step
     if parts.reference.period is not None:
         start_up = start_up_of(parts.reference.period(lane.reference), duration, parts.reference.is_wave)
     lane.course = ReferenceSummary(
@@ -196,7 +198,8 @@ def start_meters(parts: Program, lane: Lane, elapsed: float, index: int, interva
 
 def update_course(parts: Program, lane: Lane, elapsed: float, index: int, interval: float) -> None:
     """Update the present part of the reference with one more sample."""
-    step, number = lane.timing.step, float(index)
+    step = lane.timing.step
+    number = float(index)
     reference = reference_at(parts, lane, elapsed * step)
     later = deciding_sample(lane.course, number, reference)
     reference_later = reference_at(parts, lane, later * interval * step)

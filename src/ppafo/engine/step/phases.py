@@ -99,7 +99,8 @@ def measure_part(parts: Program, lane: Lane, now: Now) -> None:
 def open_valve(parts: Program, lane: Lane, now: Now) -> None:
     """Set the valve state and the flows at the start of the step."""
     command = command_of(parts, lane, now)
-    time, length = time_of(parts, lane, now), length_of(parts, lane)
+    time = time_of(parts, lane, now)
+    length = length_of(parts, lane)
     if parts.is_parted:
         # A part may be refused: its valve becomes the state only once it is taken.
         lane.shown, lane.next_valve = parts.valve.advance(lane.valve, lane.valve_state, command, time, length)
@@ -153,7 +154,8 @@ def pass_gas(parts: Program, lane: Lane, now: Now) -> None:
         port_1, port_2 = parts.valve.connect(source, lane.shown)
     else:
         port_1, port_2 = parts.valve.connect_ahead(source, lane.shown)
-    flow, stage = parts.valve.port_flow, lane.gas_stage
+    flow = parts.valve.port_flow
+    stage = lane.gas_stage
     lane.passing = pneumatics.gas_flows(lane.plant, stage.end_1, stage.end_2, port_1, port_2, flow).flows
     if parts.stated_at_ports:
         stated.restore(parts, lane)
@@ -194,7 +196,9 @@ def begin_motion(parts: Program, lane: Lane, time: float, longest: float) -> Non
     The gas then works against the motion that actually happens. A vane at rest slides if the torque exceeds static
     friction.
     """
-    plant, angle, velocity = lane.plant, lane.state.angle, lane.state.angular_velocity
+    plant = lane.plant
+    angle = lane.state.angle
+    velocity = lane.state.angular_velocity
     beginning = time + motion.SAME_INSTANT if parts.shank_jumps else time
     added = torque_of_leg(parts, lane, beginning, angle)
     pressure_1, pressure_2 = parts.actuator.pressures(plant, angle, lane.state.mass_1, lane.state.mass_2)
@@ -230,8 +234,10 @@ def slide(parts: Program, lane: Lane, now: Now) -> None:
     end = time_of(parts, lane, now) + length
     # Just before a jump that ends the part, as the next one begins just behind it.
     ending = end - motion.SAME_INSTANT if parts.shank_jumps else end
-    plant, begun = lane.plant, lane.begun
-    ahead, velocity = begun.next_angle, lane.fed.angular_velocity
+    plant = lane.plant
+    begun = lane.begun
+    ahead = begun.next_angle
+    velocity = lane.fed.angular_velocity
     added = torque_of_leg(parts, lane, ending, ahead)
     next_1, next_2 = parts.actuator.pressures(plant, ahead, lane.fed.mass_1, lane.fed.mass_2)
     next_torque = driving_torque(plant, parts.actuator.torque(plant, ahead, next_1, next_2), ahead) + added
@@ -245,7 +251,8 @@ def slide(parts: Program, lane: Lane, now: Now) -> None:
 
     # The sums with 0 are also in ``depart_at``, so that a vane at rest has its bits.
     place = motion.clamp_angle(plant, lane.fed.angle + 0.0)
-    at_lower, at_upper = place <= plant.angle_min, place >= plant.angle_max
+    at_lower = place <= plant.angle_min
+    at_upper = place >= plant.angle_max
     stays = holds_still(begun.torque + 0.0 * (next_torque - begun.torque), friction.at_rest, at_lower, at_upper)
     stays_later = holds_still(next_torque, friction.at_rest, at_lower, at_upper)
     rests_on = begun.way == 0.0 and stays and stays_later
@@ -263,7 +270,9 @@ def depart(parts: Program, lane: Lane) -> None:
     """Set the end of the part for a vane that reverses or starts to move, which is rare; otherwise it is unchanged."""
     gas.add(parts, lane)
     length = length_of(parts, lane)
-    begun, slid, velocity = lane.begun, lane.slid, lane.fed.angular_velocity
+    begun = lane.begun
+    slid = lane.slid
+    velocity = lane.fed.angular_velocity
     fall = velocity - slid.angular_velocity
     fraction = velocity / (fall if fall != 0.0 else 1.0) if begun.way != 0.0 else 0.0
     turning_angle = motion.clamp_angle(lane.plant, lane.fed.angle + 0.5 * fraction * length * velocity)
@@ -281,8 +290,11 @@ def depart(parts: Program, lane: Lane) -> None:
 
 def motion_error(parts: Program, lane: Lane, angle: float, length: float) -> float:
     """Ratio of the error of the angle at the end of a part [rad] to the allowed error [-]."""
-    plant, begun, slid = lane.plant, lane.begun, lane.slid
-    sliding, damping = slid.friction.in_motion, plant.viscous_damping
+    plant = lane.plant
+    begun = lane.begun
+    slid = lane.slid
+    sliding = slid.friction.in_motion
+    damping = plant.viscous_damping
     last = net_torque(slid.torque, begun.way, sliding, damping, begun.next_angle, slid.angular_velocity) / plant.inertia
     # A change of acceleration over the part bends the path by a sixth of it times the length squared.
     bent = abs(last - begun.acceleration) * length * length * motion.SIXTH if begun.way != 0.0 else 0.0
@@ -300,7 +312,8 @@ def motion_error(parts: Program, lane: Lane, angle: float, length: float) -> flo
 
 def finish(parts: Program, lane: Lane, now: Now) -> None:
     """Set the state at the end of a step or part, unless the part is refused, and the first time of a failure."""
-    time, length = time_of(parts, lane, now), length_of(parts, lane)
+    time = time_of(parts, lane, now)
+    length = length_of(parts, lane)
     if parts.angle is not None:
         feed_gas(parts, lane)
     # Gas before motion: the vane ends under the pressures of the new gas.
@@ -309,7 +322,8 @@ def finish(parts: Program, lane: Lane, now: Now) -> None:
     gas.work(parts, lane)
     if parts.stated:
         stated.advance(parts, lane, command_of(parts, lane, now), length)
-    taken, follows = True, True
+    taken = True
+    follows = True
     if parts.is_adaptive:
         missed = 0.0 if parts.rests_whole and rests(parts, lane) else error_of(parts, lane, now)
         # A part with a mass below 0 or NaN counts as the worst error, and is done again, shorter.

@@ -17,7 +17,8 @@ def control(parts: Program, lane: Lane, now: Now) -> None:
     )
     lane.controller_state = after
     if parts.valve.command_for is not None and parts.has_reference:
-        seen_1, seen_2 = lane.seen.pressure_1, lane.seen.pressure_2
+        seen_1 = lane.seen.pressure_1
+        seen_2 = lane.seen.pressure_2
         command = parts.valve.command_for(lane.valve, command, seen_1, seen_2)
     if parts.inverts_valve:
         command = sent_command(command)
@@ -48,7 +49,8 @@ def vane(parts: Program, lane: Lane, now: Now) -> Measurement:
     """Return the sensor readings of an actuator."""
     if parts.late_signals:
         angle = lane.signal_history[0, now.late_signal]
-        pressure_1, pressure_2 = lane.signal_history[1, now.late_signal], lane.signal_history[2, now.late_signal]
+        pressure_1 = lane.signal_history[1, now.late_signal]
+        pressure_2 = lane.signal_history[2, now.late_signal]
     else:
         angle, pressure_1, pressure_2 = present_signals(parts, lane)
     if parts.ideal_sensors:

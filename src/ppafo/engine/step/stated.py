@@ -71,9 +71,11 @@ def advance(parts: Program, lane: Lane, command: float, length: float) -> None:
 
 def error(parts: Program, lane: Lane, command: float, length: float) -> float:
     """Return the largest difference between exact step and linear extrapolation, divided by the allowed error [-]."""
-    begun, worst = begun_moment(parts, lane, command), 0.0
+    begun = begun_moment(parts, lane, command)
+    worst = 0.0
     for name, kind in parts.stated_with_errors.items():
-        state, after = lane[f"{name}_state"], lane[f"{name}_state_after"]
+        state = lane[f"{name}_state"]
+        after = lane[f"{name}_state_after"]
         rates = kind.slopes(lane[name], state, begun)
         for field, allowed in zip(kind.fields, kind.tolerances, strict=True):
             straight = straight_on(getattr(state, field), getattr(rates, field), length)

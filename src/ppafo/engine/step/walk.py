@@ -88,7 +88,9 @@ def find_gait(parts: Program, lane: Lane) -> None:
 
 def begin(parts: Program, lane: Lane) -> None:
     """Set the predicted step of the foot, free and on the ground. Equations (1), (2), (10)."""
-    state, step, ground_angle = lane.state, length_of(parts, lane), lane.gait_timing.ground_angle
+    state = lane.state
+    step = length_of(parts, lane)
+    ground_angle = lane.gait_timing.ground_angle
     velocity = state.angular_velocity
     way = direction_of(velocity)
     pressure_1, pressure_2 = parts.functions.held_pressures(lane.plant, lane.held, state)
@@ -136,7 +138,9 @@ def hold_ahead(parts: Program, lane: Lane) -> None:
 def reach(parts: Program, lane: Lane) -> None:
     """Set the state at the end of a step in which the foot neither reverses nor starts to move."""
     gas.add(parts, lane)
-    begun, step, velocity = lane.walk_begun, length_of(parts, lane), lane.fed.angular_velocity
+    begun = lane.walk_begun
+    step = length_of(parts, lane)
+    velocity = lane.fed.angular_velocity
     free = is_free(parts, lane)
     predicted = clamp_angle(lane.plant, begun.free_angle)
     # One direction of the foot for the whole end: where an event stops it short, the difference is of second order.
@@ -169,8 +173,12 @@ def reach(parts: Program, lane: Lane) -> None:
 def depart(parts: Program, lane: Lane) -> None:
     """Set the end of a step with a stop, reversal or start of motion, which is rare; otherwise it is unchanged."""
     gas.add(parts, lane)
-    begun, ended, state, ahead = lane.walk_begun, lane.ended, lane.fed, lane.ahead
-    step, velocity = length_of(parts, lane), state.angular_velocity
+    begun = lane.walk_begun
+    ended = lane.ended
+    state = lane.fed
+    ahead = lane.ahead
+    step = length_of(parts, lane)
+    velocity = state.angular_velocity
     pressure_1, pressure_2 = parts.functions.held_pressures(lane.plant, ahead, state)
     way = direction_of(velocity)
     # The velocity runs linearly between begin and end: its zero is the reversal.
@@ -205,7 +213,9 @@ def depart(parts: Program, lane: Lane) -> None:
 
 def external_torque(parts: Program, lane: Lane, acceleration: float) -> float:
     """T_ex [N m]: for a free foot by equation (11), on the ground the actuator torque that equation (1) leaves."""
-    after, plate, speed = lane.after, -lane.carried.plate, lane.after.angular_velocity
+    after = lane.after
+    plate = -lane.carried.plate
+    speed = lane.after.angular_velocity
     # In the air the foot takes what its own motion needs; on the ground the shank leads, and the device gives what is
     # left.
     passive_damping = viscous_torque(lane.leg.ankle_damping, speed)
@@ -224,7 +234,10 @@ def end(parts: Program, lane: Lane, length: float) -> None:
     """Set the states of plant and leg at the end of the step: sensor forces, and totals over the strides."""
     lane.held = lane.ahead
     lane.after = with_motion(lane.fed, lane.ended.angle, lane.ended.rate)
-    timing, walk, now, after = lane.gait_timing, lane.walk, lane.next_gait, lane.after
+    timing = lane.gait_timing
+    walk = lane.walk
+    now = lane.next_gait
+    after = lane.after
     given_torque = external_torque(
         parts, lane, (after.angular_velocity - lane.fed.angular_velocity) / max(length, SHORTEST)
     )

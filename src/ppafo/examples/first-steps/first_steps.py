@@ -49,7 +49,8 @@ CHANGES = {
 print(f"{'':<16} {'RMS error':>12} {'CO2':>8}")
 for label, overrides in CHANGES.items():
     changed = ppafo.simulate("torque-task-proportional", overrides)
-    error, gas = changed.metrics["rms_error"].value, changed.metrics["gas_supplied"].value
+    error = changed.metrics["rms_error"].value
+    gas = changed.metrics["gas_supplied"].value
     print(f"{label:<16} {error:8.3f} N m {gas * 1e3:6.2f} g")
 
 # %% Compare the two valves of the paper
@@ -60,7 +61,8 @@ print(f"{'reference':>9}  {'scenario':<24} {'RMS error':>12} {'CO2':>8} {'revers
 for level in ("6 N m", "4 N m"):
     pair = ppafo.simulate_many([ppafo.load_scenario(name, [f"reference.level={level}"]) for name in NAMES])
     for name, one in zip(NAMES, pair, strict=True):
-        error, gas = one.metrics["rms_error"].value, one.metrics["gas_supplied"].value
+        error = one.metrics["rms_error"].value
+        gas = one.metrics["gas_supplied"].value
         reversals = one.metrics["oscillations_ramp"].value + one.metrics["oscillations_hold"].value
         print(f"{level:>9}  {name:<24} {error:8.3f} N m {gas * 1e3:6.2f} g {reversals:10.0f}")
 

@@ -30,7 +30,8 @@ DRAWN = {  # SI: N m, Pa absolute, m^3
 }
 LOWEST = np.array([0.0, 0.0, 0.0, -30.0, -30.0, -1.0], dtype=np.float32)
 HIGHEST = np.array([3.2, 10.0, 10.0, 30.0, 30.0, 1.0], dtype=np.float32)
-BAR, GRAM = 1.0e5, 1.0e-3
+BAR = 1.0e5
+GRAM = 1.0e-3
 
 
 class TorqueTask(gymnasium.Env[np.ndarray, np.ndarray]):
@@ -41,7 +42,8 @@ class TorqueTask(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def __init__(self, duration: str = "1 s", error_weight: float = 1.0, gas_weight: float = 1.0) -> None:
         self.overrides = {"run.duration": duration, **SENSORS}
-        self.error_weight, self.gas_weight = error_weight, gas_weight
+        self.error_weight = error_weight
+        self.gas_weight = gas_weight
 
     def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[np.ndarray, dict[str, Any]]:
         """Start an episode with numbers drawn by the generator of the environment."""
@@ -53,7 +55,8 @@ class TorqueTask(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Apply a command for one sample; the info has the torque error [N m] and the gas since the start [kg]."""
-        command, gas = float(np.clip(action[0], -1.0, 1.0)), self.run.state.supplied_mass
+        command = float(np.clip(action[0], -1.0, 1.0))
+        gas = self.run.state.supplied_mass
         self.run.step(command)
         gas = self.run.state.supplied_mass - gas
         error = self.run.reference - self.run.measurement.torque
@@ -72,12 +75,15 @@ gymnasium.register("ppafo/TorqueTask-v0", entry_point=TorqueTask)
 if __name__ == "__main__":
     from gymnasium.utils.env_checker import check_env
 
-    env, total, over = gymnasium.make("ppafo/TorqueTask-v0").unwrapped, 0.0, False
+    env = gymnasium.make("ppafo/TorqueTask-v0").unwrapped
+    total = 0.0
+    over = False
     check_env(env)
     observation, drawn = env.reset(seed=1)
     while not over:  # the law that an agent has to beat
         action = np.array([0.3 * (observation[4] - observation[3])], dtype=np.float32)
         observation, reward, failed, ended, info = env.step(action)
-        total, over = total + reward, failed or ended
+        total = total + reward
+        over = failed or ended
     print(f"return {total:.3f} with {info['supplied_mass'] / GRAM:.3f} g of gas")
     print(env.run.result())  # as of `ppafo simulate`

@@ -6,7 +6,8 @@ import sys
 
 from ppafo.model.sensors import Measurement
 
-SAMPLE, ANSWER = struct.Struct("<I6d"), struct.Struct("<Id")
+SAMPLE = struct.Struct("<I6d")
+ANSWER = struct.Struct("<Id")
 
 
 class Proportional:
@@ -21,7 +22,8 @@ class Proportional:
 
 
 if __name__ == "__main__":
-    plant, law = ("127.0.0.1", int(sys.argv[1]) if len(sys.argv) > 1 else 5000), Proportional()
+    plant = ("127.0.0.1", int(sys.argv[1]) if len(sys.argv) > 1 else 5000)
+    law = Proportional()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
         line.bind(("", 0))
         line.settimeout(0.1)

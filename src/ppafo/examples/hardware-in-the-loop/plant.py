@@ -24,7 +24,8 @@ import time
 
 import ppafo
 
-SAMPLE, ANSWER = struct.Struct("<I6d"), struct.Struct("<Id")
+SAMPLE = struct.Struct("<I6d")
+ANSWER = struct.Struct("<Id")
 LONGEST_SILENCE, LONGEST_WAIT = 0.02, 1.0  # s
 
 
@@ -46,7 +47,11 @@ def answer_to(number: int, line: socket.socket, until: float) -> float | None:
 def exchange(run: ppafo.SteppedRun, line: socket.socket, lock_step: bool) -> tuple[int, int]:
     """Run the plant under the commands of the board; return the number of samples, and of those without an answer."""
     _, board = line.recvfrom(64)
-    due, command, number, missed, last = time.perf_counter(), 0.0, 0, 0, 0
+    due = time.perf_counter()
+    command = 0.0
+    number = 0
+    missed = 0
+    last = 0
     patience = 1 if lock_step else max(1, round(LONGEST_SILENCE / run.period))
     while not run.is_over and number - last < patience:
         line.sendto(SAMPLE.pack(number, run.time, run.reference, *run.measurement[:4]), board)
@@ -57,7 +62,8 @@ def exchange(run: ppafo.SteppedRun, line: socket.socket, lock_step: bool) -> tup
         if answer is None:
             missed += 1
         else:
-            command, last = answer, number
+            command = answer
+            last = number
         if not lock_step:
             time.sleep(max(0.0, due - time.perf_counter()))
         run.step(command)

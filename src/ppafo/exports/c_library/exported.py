@@ -18,8 +18,9 @@ The last number is 1 for error control of the parts of a step, else 0.
 Further = Callable[[SourceCollector], str]
 """Function that returns the source of a further composed function, after collecting the functions it calls."""
 
-WHOLE, IN_PARTS = "advance", "advance_in_parts"
-"""C names of the time-stepping loops: with whole steps (or the only loop), and with steps in parts."""
+# C names of the time-stepping loops: with whole steps (or the only loop), and with steps in parts.
+WHOLE = "advance"
+IN_PARTS = "advance_in_parts"
 
 
 @dataclass(frozen=True, slots=True)

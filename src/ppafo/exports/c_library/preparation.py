@@ -252,7 +252,9 @@ def choose_parts(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
 
 def set_laws(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set the parameters of the controller, the reference and the prescribed angle."""
-    controller, reference, path = parts.program.controller, parts.program.reference, parts.program.angle
+    controller = parts.program.controller
+    reference = parts.program.reference
+    path = parts.program.angle
     if controller is not None:
         lane.controller = component_row(controller, settings, "controller")
     if parts.scenario.follows_reference:

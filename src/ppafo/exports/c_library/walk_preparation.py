@@ -67,8 +67,10 @@ def check_can_be_exported(configuration: Scenario) -> None:
 
 def rules_of_walk(configuration: Scenario, settings: Iterable[ExportParameter]) -> tuple[Condition, ...]:
     """Return the rules of a walk file with the gait, and of three numbers (``walking/contradictions.py``)."""
-    stride, (low, high) = walk_of(configuration).gait.stride_time, angles_of_gait(configuration)
-    first, peak = "controller_first_stride_time", "controller_peak_time"
+    stride = walk_of(configuration).gait.stride_time
+    low, high = angles_of_gait(configuration)
+    first = "controller_first_stride_time"
+    peak = "controller_peak_time"
     rules = (
         (f"settings->actuator_angle_max >= {high - BEYOND_STOP!r}", "actuator_angle_max"),
         (f"settings->actuator_angle_min <= {low + BEYOND_STOP!r}", "actuator_angle_min"),

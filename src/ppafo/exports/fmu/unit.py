@@ -223,7 +223,8 @@ def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
     if plant is not None:
         templates[1:] = ["plant_inputs.c", "plant.c"]
         places = {variable.name: f"inputs[{index}]" for index, variable in enumerate(plant.inputs)}
-        words["inputs"], words["follow"] = ", ".join(places.values()), follow_lines(plant, "settings", places)
+        words["inputs"] = ", ".join(places.values())
+        words["follow"] = follow_lines(plant, "settings", places)
         words["checked"] = "the limits of the inputs, inertia, volumes and areas"
     unit = "\n".join(filled(template("ppafo.exports.fmu", file), words) for file in ("unit.c", *templates))
     headers = files("ppafo.exports.fmu").joinpath("headers")

@@ -19,8 +19,10 @@ from ppafo.gait.recorded.signal import LOADS, CurveColumns, Signal, low_pass, wi
 from ppafo.gait.recorded.table import OFF, STRIKE, MotionTable
 from ppafo.wording import count_of
 
-FORCE, SHANK, FILE = "vertical_force", "shank_angle", "events of the file"
-"""Names of the sources of strides: vertical force, shank angle, and events stored in the file."""
+# Names of the sources of strides: vertical force, shank angle, and events stored in the file.
+FORCE = "vertical_force"
+SHANK = "shank_angle"
+FILE = "events of the file"
 LEAST_STRIDES = 2
 """Default of the smallest number of strides; 1 for a walk across a force plate and for a single cycle."""
 _SMOOTH = 6.0
@@ -48,8 +50,9 @@ LONGEST = 1.5
 _MISFIT = 0.06
 """Largest RMS difference between start and end in their overlap, of values and rates relative to their ranges [-]; two
 strides of one healthy walk differ by 0.03."""
-LOADED, UNLOADED = 0.05, 0.03
-"""Thresholds of the force [body weights]: the foot is on the ground above the first, and off it below the second."""
+# Thresholds of the force [body weights]: the foot is on the ground above the first, and off it below the second.
+LOADED = 0.05
+UNLOADED = 0.03
 SHORTEST_CONTACT = 0.1
 """Duration [s] below which a contact, or a time off the ground, is noise of the force plate."""
 _LEAST_LEAN = 0.5

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.arguments import checked
-from ppafo.errors import DataError, Faults, PpafoError
+from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.document import load_gait
 from ppafo.gait.gait import HARMONICS, REQUIRED, FitError, Gait, GaitCurve, Origin, fit_curve
 from ppafo.gait.plausible import (
@@ -48,10 +48,12 @@ SAMPLES = 101
 """Number of samples of a time-normalised curve, both ends of the stride included."""
 PHASES = np.linspace(0.0, 1.0, SAMPLES)
 """Phases [strides] of a time-normalised curve, from 0 to 1."""
-REMARKED_SPREAD, REFUSED_SPREAD = 0.1, 0.25
-"""Standard deviation between strides relative to the range [-] for a remark and for rejection; usual: 0.004 to 0.06."""
-REMARKED_MISFIT, REFUSED_MISFIT = 0.03, 0.1
-"""RMS residual of the series relative to the range [-] for a remark, and for rejection; correct curves: below 0.01."""
+# Standard deviation between strides relative to the range [-] for a remark and for rejection; usual: 0.004 to 0.06.
+REMARKED_SPREAD = 0.1
+REFUSED_SPREAD = 0.25
+# RMS residual of the series relative to the range [-] for a remark, and for rejection; correct curves: below 0.01.
+REMARKED_MISFIT = 0.03
+REFUSED_MISFIT = 0.1
 _UNLOADED_PHASE = 0.02
 """Duration at both ends of the stance [strides] with too little force for a centre of pressure."""
 LARGEST_STRIDE_CHANGE = 0.25
@@ -66,10 +68,12 @@ _COARSE = 0.001
 """Resolution relative to the range [-] above which a sensor counts as coarse and may be constant at a turning point."""
 _STEPS_OF_REST = 3.0
 """Largest change, in smallest increments, before and after a constant value of a coarse sensor at a turning point."""
-ODD_SHAPE, ODD_PHASE, ODD_AGAINST_OTHERS = 0.25, 0.4, 4.0
-"""Limits for an odd stride: distance of its curve from the median curve relative to the range, as RMS over the stride
-and at any one phase, and relative to the median distance of all strides. Impaired walking varies more, but in every
-stride."""
+# Limits for an odd stride: distance of its curve from the median curve relative to the range, as RMS over the stride
+# and at any one phase, and relative to the median distance of all strides. Impaired walking varies more, but in every
+# stride.
+ODD_SHAPE = 0.25
+ODD_PHASE = 0.4
+ODD_AGAINST_OTHERS = 4.0
 _FEWEST_TO_COMPARE = 3
 """Least number of strides for the detection of an odd stride."""
 _MOST_ODD = 0.4
@@ -170,14 +174,14 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     DataError that lists all problems with file, column, row and remedy: after a problem with one curve, the other
     curves are still checked. Repaired values are listed in the remarks.
     """
-    wrong = Faults()
-    with wrong:
+    wrong: list[PpafoError] = []
+    with noted_in(wrong):
         check_settings(settings)
     source = read_source(files, settings, wrong)
     try:
         footfalls = find_footfalls(source.walk, source.tables, settings.side, settings.least_strides)
     except PpafoError as error:
-        Faults([*wrong, error]).raise_all()
+        raise_noted([*wrong, error])
     curves, strides, unmeasured = _curves_over_strides(source, footfalls, wrong)
     # Both coordinates of the knee may be from one marker, whose scale is one.
     labels = [name.rpartition(".")[0] for name in unsigned_names(source.columns.knee)]
@@ -192,7 +196,7 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     most = f"at most {100.0 * REFUSED_SPREAD:.0f} % and {100.0 * REFUSED_MISFIT:.0f} % are accepted"
     scattered = _scatters(curves, REFUSED_SPREAD, REFUSED_MISFIT)
     wrong += [DataError(f"{walk[name].file}: {message}; {most}") for name, message in scattered]
-    with wrong:
+    with noted_in(wrong):
         # The ankle of the other foot looks like a wrong zero to the checks of the curves.
         check_side(mean_stride, load_gait())
         check_plausible(mean_stride)
@@ -202,7 +206,7 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
         if speed < -_FASTEST_BACK:
             against = f"the knee moves backwards at {-speed:.2g} m/s, so knee.forward points against the"
             wrong.append(DataError(f"{way.file}: {against} walking direction"))
-    wrong.raise_all()
+    raise_noted(wrong)
     less = ": heel strikes and toe-offs are from shank_angle and less exact" if footfalls.events == SHANK else ""
     foot = source.columns.ankle_angle
     count = len(strides.taken)
@@ -254,7 +258,7 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
 
 
 def _curves_over_strides(
-    source: GaitSource, footfalls: Footfalls, wrong: Faults
+    source: GaitSource, footfalls: Footfalls, wrong: list[PpafoError]
 ) -> tuple[dict[str, CurveStatistics], StrideSelection, list[str]]:
     """Return the curves over the selected strides, the selection, and a remark on each load without a measured stance.
 
@@ -277,7 +281,7 @@ def _curves_over_strides(
     if len(kept) < least:
         wrong.append(DataError(_too_few(usable, footfalls)))
     if not kept:
-        wrong.raise_all()
+        raise_noted(wrong)
     covered = {name: [stride for stride in usable.taken if covers(footfalls, name, stride)] for name in recorded}
     # A load that no plate measured for a whole stance would otherwise be refused as one whose file is too short.
     uncovered = [name for name in LOADS if name in recorded and not covered[name]]
@@ -307,7 +311,7 @@ def _curves_over_strides(
             )
         )
     if any(name not in remaining for name in REQUIRED):
-        wrong.raise_all()
+        raise_noted(wrong)
     remarks = [f"{name} is left out: not measured throughout the stance of any stride" for name in unmeasured]
     return remaining, strides, remarks
 
@@ -337,7 +341,7 @@ def without_drop_outs(
     tables: Sequence[MotionTable],
     covered: Mapping[str, Sequence[Stride]],
     strides: StrideSelection,
-    wrong: Faults,
+    wrong: list[PpafoError],
 ) -> StrideSelection:
     """Reject strides in which a column is constant for more than 0.1 s; in swing, a load may be constant.
 
@@ -360,7 +364,7 @@ def without_drop_outs(
         for column, values in columns:
             for start, end in constant_stretches(table.time, values, spans):
                 what = f"column {column!r} of {name} is constant from {start:.4g} to {end:.4g} s"
-                with wrong:
+                with noted_in(wrong):
                     strides = strides.without(
                         [stride for stride in strides.taken if stride.start < end and start < stride.end],
                         f"{what}: a sensor drop-out",

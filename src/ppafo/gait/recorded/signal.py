@@ -9,7 +9,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.errors import DataError, Faults, UnitError, refused_as
+from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted, refused_as
 from ppafo.gait.gait import HARMONICS
 from ppafo.gait.recorded.mapping import KneeMap, column_names, setting_text, unsigned_names
 from ppafo.gait.recorded.table import COORDINATES, MotionTable, marker_of
@@ -27,8 +27,9 @@ LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
 """Curves that are undefined while the foot is off a force plate, which does not count as a gap."""
 _RATE = "rad/s"
 _NOT_INTEGRATED = "; integrate it over each stride, less its mean over the stride, and set the zero while standing"
-_MOST_NAMES, _LONGEST_TEXT = 12, 160
-"""Limits of an error message: number of column names, and characters of the names and of a remark."""
+# Limits of an error message: number of column names, and characters of the names and of a remark.
+_MOST_NAMES = 12
+_LONGEST_TEXT = 160
 THIGH_FRACTION = 0.245
 """Thigh length as a fraction of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement,
 4th ed. 2009."""
@@ -113,10 +114,10 @@ class CurveColumns:
         """Return the sum of the terms in the first SI unit that fits, and this unit; raises DataError if none fits."""
         total = np.zeros(self.table.time.size)
         chosen = si_units[0]
-        wrong = Faults()
+        wrong: list[PpafoError] = []
         for sign, name in self.terms:
             if self.unit_key.partition(".")[0] not in LOADS:
-                with wrong:
+                with noted_in(wrong):
                     check_recorded(self.table.columns[name], f"{self.table.file}: column {name!r}")
             where = f"{self.table.file}: column {name!r}"
             unit = stated or self.table.units[name]
@@ -136,7 +137,7 @@ class CurveColumns:
                 problem = ""
                 break
             wrong += [DataError(f"{where}{problem}")] if problem else []
-        wrong.raise_all()
+        raise_noted(wrong)
         return total, chosen
 
 
@@ -263,7 +264,8 @@ def knee_position(hip_forward: Floats, hip_up: Floats, lean: Floats, thigh_lengt
 def _thigh_length(mapped: KneeMap, stature: float | None) -> float:
     if mapped.thigh_length is None:
         return THIGH_FRACTION * (stature or 0.0)
-    where, (low, high) = f"knee.thigh_length = {mapped.thigh_length!r}", _LENGTHS
+    where = f"knee.thigh_length = {mapped.thigh_length!r}"
+    low, high = _LENGTHS
     with refused_as(DataError, where, UnitError):
         length = parse_quantity(mapped.thigh_length, "m")
     if not low <= length <= high:

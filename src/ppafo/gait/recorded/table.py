@@ -11,8 +11,9 @@ from ppafo.signals.recording import Floats
 from ppafo.storage.comma_separated import check_clock
 from ppafo.wording import argument_text
 
-STRIKE, OFF = "foot strike", "foot off"
-"""Kinds of events in a file: heel strike and toe-off."""
+# Kinds of events in a file: heel strike and toe-off.
+STRIKE = "foot strike"
+OFF = "foot off"
 
 AXES = "xyz"
 COORDINATES = (".x", ".y", ".z")

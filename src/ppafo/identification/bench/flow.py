@@ -47,11 +47,11 @@ _MINIMUM_SAMPLES = 5
 _FULLY_OPEN = 0.99
 _FEW = 10
 """Reciprocal of the largest fraction of readings without flow or with crossed pressures that counts as noise."""
-_FLOW_AT_REST, _APART_AT_REST, _FINEST = 5.0e-3, 0.1, 1.0e-5
-"""Largest flow about the zero and pressure difference of readings at rest, and finest zero [-].
-
-All are fractions of the largest readings: at a tenth of the pressure difference any law has a tenth of the flow.
-"""
+# Largest flow about the zero and pressure difference of readings at rest, and finest zero [-]. All are fractions of
+# the largest readings: at a tenth of the pressure difference any law has a tenth of the flow.
+_FLOW_AT_REST = 5.0e-3
+_APART_AT_REST = 0.1
+_FINEST = 1.0e-5
 _FEWEST_AT_REST = 2
 _NEARLY_EQUAL = 0.9
 _REGIMES = "choked flow", "subsonic flow", "flow at nearly equal pressures"
@@ -59,13 +59,15 @@ LARGEST_COEFFICIENT = 1.0
 """Largest possible discharge coefficient [-], of a jet as wide as its opening: above it the area or a unit is wrong."""
 _GRAMS_PER_BAR = 1.0e8
 """Conversion factor from kg/(s Pa) to g/s per bar."""
-_SIZE, _GAP = FitNumber("size"), FitNumber("gap")
-"""Sizes of an opening that is not reported."""
+# Sizes of an opening that is not reported.
+_SIZE = FitNumber("size")
+_GAP = FitNumber("gap")
 Law = Literal["orifice", "iso6358", "laminar", "both"]
 
 VALVE = "name of a valve of the set; default: the chosen one"
-_COLDEST, _HOTTEST = 150.0, 600.0
-"""Lowest and highest gas temperature [K] of a bench."""
+# Lowest and highest gas temperature [K] of a bench.
+_COLDEST = 150.0
+_HOTTEST = 600.0
 _SAME_GAS = 0.01
 _THERMOMETER = 1.0
 """Error limit [K] of a gas temperature stated in the problem file."""
@@ -76,8 +78,9 @@ The parameter ``flow.linear_ratio`` of a set belongs to the numerics of the engi
 """
 CRITICAL_RATIOS = 0.2, 0.01, 0.95
 """Critical ratio of ISO 6358 [-] in an estimation: start, lowest and highest value."""
-_SPAN, _SUBSONIC = 0.15, 0.6
-"""Least span and least maximum of the pressure ratios [-] needed to fit both parameters of ISO 6358."""
+# Least span and least maximum of the pressure ratios [-] needed to fit both parameters of ISO 6358.
+_SPAN = 0.15
+_SUBSONIC = 0.6
 LAW_NAMES: Mapping[Law, str] = {
     "orifice": "orifice",
     "laminar": "laminar gap",
@@ -87,7 +90,10 @@ LAW_NAMES: Mapping[Law, str] = {
 
 GAP = "effects.laminar_leak.coefficient"
 """Path of the coefficient of a laminar gap beside the orifice in a set."""
-TEMPERATURE, GAS_LAW, METER, SENSORS = "gas temperature", "gas law", "gain of the flow meter", "gain of the pressures"
+TEMPERATURE = "gas temperature"
+GAS_LAW = "gas law"
+METER = "gain of the flow meter"
+SENSORS = "gain of the pressures"
 ZERO = "zero of the flow meter"
 _COMMON_ZERO = "zero of both pressures"
 _APPARENT = "laminar gap equivalent to a gain error of the flow meter"
@@ -491,7 +497,8 @@ class OpenValveFlowProblem(FlowLaw):
         if np.ptp(flow[is_open]) <= 0.0:
             readings.check_moves(sources[0], "mass_flow")
         pressures, flow, recorded, meter_remarks = steady_readings(sources, VALVE_PRESSURES, zero, is_open)
-        (upstream, downstream), flow = pressures.values(), np.abs(flow)
+        upstream, downstream = pressures.values()
+        flow = np.abs(flow)
         ratio = downstream / upstream
         text = f"Discharge coefficient with the set's area of {1e6 * (area or 0.0):.4g} mm^2; only Cd A is identified"
         of_set = (FitNumber(f"{path}.discharge_coefficient", text=text), area) if area else None

@@ -32,19 +32,22 @@ from ppafo.signals.faults import is_at_limit, noise_of, plateaus
 from ppafo.signals.recording import Floats
 from ppafo.wording import count_of
 
-_ANGLE, _VELOCITY = "angle", "angular_velocity"
-"""Fitted channels; the velocity is fitted together with the angle, if recorded."""
+# Fitted channels; the velocity is fitted together with the angle, if recorded.
+_ANGLE = "angle"
+_VELOCITY = "angular_velocity"
 _MINIMUM_SAMPLES = 20
-_FEWEST_SMOOTHED, _SMOOTHED_FRACTION = 5, 0.04
-"""Least number and fraction of the samples of a decay to which a local parabola is fitted."""
+# Least number and fraction of the samples of a decay to which a local parabola is fitted.
+_FEWEST_SMOOTHED = 5
+_SMOOTHED_FRACTION = 0.04
 _REVERSAL = 0.02
 """Backward velocity relative to the largest velocity [-] that counts as a reversal; noise at rest stays below."""
 _VELOCITY_MAY_DIFFER = 0.1
 """Largest relative difference of velocity and rate of the angle [-]; a wrong unit or sign differs by more."""
 _MINIMUM_OVER_NOISE = 20.0
 """Least range of the angle divided by its noise [-] for motion to be detected."""
-_NEAR, _NOISE_NEAR = 0.05, 6.0
-"""Distance from the end of a swing within which the vane is near it: fraction of the swing [-], at least this noise."""
+# Distance from the end of a swing within which the vane is near it: fraction of the swing [-], at least this noise.
+_NEAR = 0.05
+_NOISE_NEAR = 6.0
 _AT_ONCE = 2.0
 """Duration near the end of a swing, relative to the last half of the swing [-], below which the vane did not rest."""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
@@ -53,18 +56,25 @@ _STEPS = 240
 """Number of steps of the speed from the start to standstill."""
 _SLOWEST = 1.0e-9
 """Lower bound of the deceleration, relative to the largest [-], so that the vane stops without Coulomb friction too."""
-_RISE, _RISE_VELOCITY, _INERTIA, _GAIN = "rise of the friction near standstill", "its velocity", "inertia", "gain"
-"""Names of the tolerances: log of 1 + q [-], w_s [rad/s], relative errors of the inertia and of the angle [-]."""
-_START_ANGLE, _START_SPEED = "start angle {}", "start speed {}"
-"""Names of the variables for initial angle [rad] and speed [rad/s], by number of the decay."""
-_USUAL_RISE_VELOCITY, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY = 0.1, 1.0e-3, 2.0
-"""Velocity at which the friction rise is halved [rad/s]: usual, lowest and highest value."""
+# Names of the tolerances: log of 1 + q [-], w_s [rad/s], relative errors of the inertia and of the angle [-].
+_RISE = "rise of the friction near standstill"
+_RISE_VELOCITY = "its velocity"
+_INERTIA = "inertia"
+_GAIN = "gain"
+# Names of the variables for initial angle [rad] and speed [rad/s], by number of the decay.
+_START_ANGLE = "start angle {}"
+_START_SPEED = "start speed {}"
+# Velocity at which the friction rise is halved [rad/s]: usual, lowest and highest value.
+_USUAL_RISE_VELOCITY = 0.1
+_LOWEST_RISE_VELOCITY = 1.0e-3
+_HIGHEST_RISE_VELOCITY = 2.0
 _STEPS_OF_DECAY = 5.0e-6, 0.2
 """Times between samples of a free decay [s], which lasts seconds at most; others mean a wrong unit of time."""
 _MOST_OF_STOPS = 10.0
 """Largest plausible ratio of swing in a free decay to angle between the stops [-]; more means a wrong unit."""
-_LEAST_SPEED, _LEAST_SWEPT = 1.0e-6, 1.0e-9
-"""Least initial speed [rad/s] and swept angle [rad] for a fit without visible motion."""
+# Least initial speed [rad/s] and swept angle [rad] for a fit without visible motion.
+_LEAST_SPEED = 1.0e-6
+_LEAST_SWEPT = 1.0e-9
 _MOVING = 0.03
 """Fraction of the largest speed [-] below which the damping panel omits the noisy acceleration."""
 

@@ -15,22 +15,23 @@ from ppafo.signals.recording import Floats
 
 _MOST_IMPOSSIBLE = 0.1
 """Largest fraction of impossible flow meter readings [-]; more means wrong signs or columns."""
-_FINE_SAMPLE, _GROSS_SAMPLE, _GROSS_READING = 0.01, 1.0 / 6.0, 0.25
-"""Outlier limits as fractions of the usual range [-]: of samples over time (a sixth of the limit), fine and gross; of
-readings, gross.
-
-A single glitch of a third of the range, as loggers produce, must not refuse a recording.
-"""
+# Outlier limits as fractions of the usual range [-]: of samples over time (a sixth of the limit), fine and gross; of
+# readings, gross. A single glitch of a third of the range, as loggers produce, must not refuse a recording.
+_FINE_SAMPLE = 0.01
+_GROSS_SAMPLE = 1.0 / 6.0
+_GROSS_READING = 0.25
 _MOST_LEFT_OUT = 0.02
 """Largest fraction of the samples of a recording over time that may be left out as outliers [-]."""
 _COARSEST = 0.05
 """Largest converter step, relative to the largest valid sample [-]; a larger step may be two equal outliers."""
 _NO_DECAY = 0.5
 """Largest difference of the first two samples from the median of the first five, relative to the range [-]."""
-_ALIKE, _FEWEST_ALIKE = 6, 8
-"""Number of neighbours for the comparison of a reading, and least number of readings to compare."""
-_FEWEST_CLIPPED, _SHARE_THAT_IS_CLIPPED = 4, 0.05
-"""Least number and fraction of samples at an extreme value [-] from which a sensor counts as saturated."""
+# Number of neighbours for the comparison of a reading, and least number of readings to compare.
+_ALIKE = 6
+_FEWEST_ALIKE = 8
+# Least number and fraction of samples at an extreme value [-] from which a sensor counts as saturated.
+_FEWEST_CLIPPED = 4
+_SHARE_THAT_IS_CLIPPED = 0.05
 _FRACTION_THAT_MOVES = 0.02
 """Least relative change of the driving quantity [-] for which a constant channel counts as saturated."""
 _LARGEST_NUMBER = 1.0e12

@@ -27,10 +27,12 @@ from ppafo.report.residuals import curve_mark, with_residuals
 from ppafo.signals.recording import Floats
 from ppafo.wording import count_of, percentage
 
-TORQUE, FORCE = "torque", "force"
+TORQUE = "torque"
+FORCE = "force"
 _PRESSURE = "pressure_difference"
-_MINIMUM_SAMPLES, _MINIMUM_LEVELS = 6, 3
-"""Least number of readings to separate slope, friction, its growth and zero, and of pressures to test linearity."""
+# Least number of readings to separate slope, friction, its growth and zero, and of pressures to test linearity.
+_MINIMUM_SAMPLES = 6
+_MINIMUM_LEVELS = 3
 _SAME_LEVEL = 0.1
 """Largest pressure difference within a level, relative to the highest pressure [-]; a regulator jitters."""
 _MORE_THAN_FRICTION = 0.3
@@ -45,10 +47,12 @@ _MOST_REPETITIONS = 12
 """Largest number of repetitions tested separately; with more, whole recordings are tested."""
 _PATHS = "actuator.torque_constant", "friction.{}_torque", "effects.seal_friction.{}_per_pressure"
 """Paths of torque constant, friction and its growth in a set, where the load is a torque."""
-_FRICTION_PER_PRESSURE, _ZERO = "static_torque.friction_per_pressure", "static_torque.zero_offset"
-"""Paths of the growth of a friction force and of the zero error of the scale, which are no parameters of a set."""
-_ZERO_OF_PRESSURE, _GAIN = "zero of the pressure sensor", "gain of the pressure sensor"
-"""Names of tolerances."""
+# Paths of the growth of a friction force and of the zero error of the scale, which are no parameters of a set.
+_FRICTION_PER_PRESSURE = "static_torque.friction_per_pressure"
+_ZERO = "static_torque.zero_offset"
+# Names of tolerances.
+_ZERO_OF_PRESSURE = "zero of the pressure sensor"
+_GAIN = "gain of the pressure sensor"
 _SIGMAS = 4.0
 """Standard errors below zero from which a negative friction guess means a wrong sign instead of noise."""
 

@@ -36,8 +36,9 @@ from ppafo.simulation.recorded.channels import check_command
 _MINIMUM_SAMPLES = 12
 _MINIMUM_RANGE = 0.5
 """Least range of the command [-] to separate dead band and gain."""
-_SHUT, _HALF_OPEN = 0.05, 0.5
-"""Fractions of the largest area [-]: below the first the valve is shut, above the second at least half open."""
+# Fractions of the largest area [-]: below the first the valve is shut, above the second at least half open.
+_SHUT = 0.05
+_HALF_OPEN = 0.5
 _SATURATES = 0.02
 """Least distance of the saturation from the highest command [-] to be identified."""
 _SMALL_COMMAND = 0.2
@@ -46,9 +47,12 @@ _FEWEST_BETWEEN = 2
 _NEARLY_FULL = 0.95
 """Least highest command [-] from which the area at full command is found."""
 _FULL = "valve_map.full_area"
-_GAIN, _PLAY, _SATURATION = "valve_map.gain", "valve_map.hysteresis", "valve_map.saturation_command"
-_ROUND, _ROUNDS = "valve_map.round_off", (0.05, 0.005, 0.5)
-"""Range over which corners of the opening are rounded, tried beside sharp ones: name, start and bounds [-]."""
+_GAIN = "valve_map.gain"
+_PLAY = "valve_map.hysteresis"
+_SATURATION = "valve_map.saturation_command"
+# Range over which corners of the opening are rounded, tried beside sharp ones: name, start and bounds [-].
+_ROUND = "valve_map.round_off"
+_ROUNDS = (0.05, 0.005, 0.5)
 _BETTER = 5.4
 """Increase of the log-likelihood [-] by one more number that happens by chance in one fit of 1,000."""
 

@@ -39,18 +39,21 @@ from ppafo.signals.recording import Floats
 from ppafo.wording import count_of
 
 _CHAMBERS = ("pressure_1", "pressure_2")
-_FEWEST_STEADY, _MINIMUM_SAMPLES = 8, 20
-"""Least number of readings of steady flow, and of samples of a decay."""
+# Least number of readings of steady flow, and of samples of a decay.
+_FEWEST_STEADY = 8
+_MINIMUM_SAMPLES = 20
 _EDGE = 20
 """Largest number of samples averaged at an end of a record for a start value, at most a tenth of the record."""
 _STANDS_STILL = 0.02
 """Largest ratio of the pressure changes of both chambers [-] at which the steadier chamber counts as a room."""
 _EQUAL = 0.01
 """Pressure difference relative to the initial difference [-] below which a decay ends."""
-_POINTS, _LOWEST = 400, 1.0e-3
-"""Number of pressure differences of a computed fall, and the last one relative to the first [-]."""
-_LEAST_DIFFERENCE, _LEAST_RATE = 1.0, 1.0e-300
-"""Least initial pressure difference [Pa] and rate [Pa/s] of a computed fall, finite for tight chambers."""
+# Number of pressure differences of a computed fall, and the last one relative to the first [-].
+_POINTS = 400
+_LOWEST = 1.0e-3
+# Least initial pressure difference [Pa] and rate [Pa/s] of a computed fall, finite for tight chambers.
+_LEAST_DIFFERENCE = 1.0
+_LEAST_RATE = 1.0e-300
 _RIVALS: Mapping[Law, tuple[Law, ...]] = {"both": ("iso6358",), "iso6358": ("both",)}
 """Law that a fitted law is compared with, by law."""
 _CLEAR = math.log(100.0)
@@ -67,16 +70,21 @@ _TRIAL_RATIOS = tuple(np.linspace(*CRITICAL_RATIOS[1:], 20).tolist())
 From the usual one, a search may end at a wrong minimum, with zeros of the sensors for the bend of the curve."""
 _SHARP = 0.6
 """Discharge coefficient of a sharp-edged hole [-]."""
-_RATIO, _VOLUME, _RELAXATION = "ratio of the volumes", "volume", "time of the relaxation"
-"""Names of the variables for V_1/V_2 [-], relative error of the volume [-], and logarithm of tau, scaled [-]."""
-_START, _RELAXED_BY = "start of {}, decay {}", "relaxation of {}, decay {}"
-"""Names of the variables for initial pressure [Pa] and relative error r after filling [-], by channel and decay."""
-_RELAXED, _MOST_RELAXED = 5.0, 0.02
-"""Usual ratio of recording length to relaxation time [-], and largest relative pressure error from relaxation [-]."""
+# Names of the variables for V_1/V_2 [-], relative error of the volume [-], and logarithm of tau, scaled [-].
+_RATIO = "ratio of the volumes"
+_VOLUME = "volume"
+_RELAXATION = "time of the relaxation"
+# Names of the variables for initial pressure [Pa] and relative error r after filling [-], by channel and decay.
+_START = "start of {}, decay {}"
+_RELAXED_BY = "relaxation of {}, decay {}"
+# Usual ratio of recording length to relaxation time [-], and largest relative pressure error from relaxation [-].
+_RELAXED = 5.0
+_MOST_RELAXED = 0.02
 _LEAST_PRESSURE = 1.0
 """Least initial pressure, least scale and least standard deviation of an initial pressure [Pa]."""
-_SCATTER_OF_CHANGE, _LEAST_CHANGE = 0.01, 1.0e-9
-"""Least pressure change for a start value: as a fraction of the noise of a tight chamber [-], and absolute [Pa]."""
+# Least pressure change for a start value: as a fraction of the noise of a tight chamber [-], and absolute [Pa].
+_SCATTER_OF_CHANGE = 0.01
+_LEAST_CHANGE = 1.0e-9
 
 _Fitted = tuple[list[Fit], bool, str, tuple[Panel, ...], tuple[str, ...], float]
 """Fits, True if readings cover choked and subsonic flow, summary, panels, remarks and scatter of a leak."""

@@ -9,7 +9,7 @@ from typing import get_args
 
 import numpy as np
 
-from ppafo.errors import Faults, IdentificationError, ScenarioError, UnitError, refused_as
+from ppafo.errors import IdentificationError, PpafoError, ScenarioError, UnitError, noted_in, raise_noted, refused_as
 from ppafo.identification.bench.law import BenchContext
 from ppafo.identification.estimate import Estimate, interval_factor
 from ppafo.identification.fit import FitNumber, tolerance
@@ -68,8 +68,10 @@ _FITS = 1.0e-6
 """Rounding tolerance [s] of sample times at the start of an experiment."""
 TIME_OFFSET = "recording.time_offset"
 """Path of the delay of the samples of a recording with respect to the run; no scenario has this parameter."""
-ZERO_OF, GAIN_OF, LAG_OF = "recording.zero_of_", "recording.gain_of_", "recording.lag_of_"
-"""Prefixes of the parameter paths of zero, gain and first-order lag of a sensor; the channel name follows."""
+# Prefixes of the parameter paths of zero, gain and first-order lag of a sensor; the channel name follows.
+ZERO_OF = "recording.zero_of_"
+GAIN_OF = "recording.gain_of_"
+LAG_OF = "recording.lag_of_"
 _SUPPLY_CHANNELS = SUPPLY, DORSIFLEXION_SUPPLY
 _OF_RECORDING = {
     TIME_OFFSET: Quantity("time_offset", "s", "delay of the samples behind the run", 0.0, -1.0, 1.0),
@@ -99,10 +101,13 @@ _LONGEST_LAG = 0.1
 """Longest time constant of a sensor that is tried [s]."""
 _EXACT = ("area", "angle_min", "angle_max", "linear_ratio", "critical_ratio", "atmospheric_pressure")
 """Parameters without a default tolerance, because another parameter or a zero error has the same effect."""
-_STRIBECK, _SHARE = "effects.stribeck.velocity", "effects.stribeck.share"
-_FACTOR, _ONE_SIDED, _LEAST = 1.5, 1.645, 0.01
-"""Prior of the Stribeck velocity: standard deviation of its logarithm, distance of the limit from its mean [-],
-and least value [limits], at which the fall of the friction is practically abrupt; at 0 the effect would be off."""
+_STRIBECK = "effects.stribeck.velocity"
+_SHARE = "effects.stribeck.share"
+# Prior of the Stribeck velocity: standard deviation of its logarithm, distance of the limit from its mean [-], and
+# least value [limits], at which the fall of the friction is practically abrupt; at 0 the effect would be off.
+_FACTOR = 1.5
+_ONE_SIDED = 1.645
+_LEAST = 0.01
 _START_OF_ANGLE = math.radians(0.05)
 """Standard deviation of an initial angle read from a recording [rad]."""
 
@@ -395,16 +400,16 @@ class TrajectoryProblem:
         if message := double_use((*self.used, *(experiment.use for experiment in self.experiments))):
             raise IdentificationError(message)
         numbers = []
-        wrong = Faults()
+        wrong = list[PpafoError]()
         for parameter in self.parameters:
             for label in (label for label in parameter.recordings if label not in labels):
                 near = known_names(label, labels)
                 raise IdentificationError(f"{parameter.path}: there is no experiment '{label}'{near}")
-            with wrong:
+            with noted_in(wrong):
                 numbers.append(
                     number_of(parameter, [item for item in self.experiments if parameter.acts_in(item.label)])
                 )
-        wrong.raise_all()
+        raise_noted(wrong)
         for kind, names in (("experiment", labels), ("parameter", [number.name for number in numbers])):
             if (twice := first_twice(names)) is not None:
                 raise IdentificationError(f"{kind} '{twice}' is given twice")

@@ -48,13 +48,15 @@ from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs, with_p
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.wording import count_of
 
-_STATIC, _DYNAMIC = "friction.static_torque", "friction.dynamic_torque"
+_STATIC = "friction.static_torque"
+_DYNAMIC = "friction.dynamic_torque"
 _DEAD_TIMES = "delay", "time_offset"
 """Last words of the paths of dead times."""
 _LAGS = 10.0
 """Least increase of the log-likelihood [-] by which lags of sensors are found."""
-_WINDOWS, _RUN = (3, 6, 12, 24, 48), 6.0
-"""Lengths of runs of residuals [samples], and size of their sum that no white noise has [standard deviations]."""
+# Lengths of runs of residuals [samples], and size of their sum that no white noise has [standard deviations].
+_WINDOWS = (3, 6, 12, 24, 48)
+_RUN = 6.0
 _FELT = 1.0e-3
 """Least residuals that are tested as bursts [ranges of the samples]; smaller ones are the engine's."""
 _BURST = 6.0
@@ -405,7 +407,8 @@ def _fit_of(problem: TrajectoryProblem, numbers: tuple[FitNumber, ...], report: 
         problem.experiments, runs, *(signals_of(each, numbers, start[:, None]) for each in (runs, finer)), strict=True
     ):
         for name in run.measured.names:
-            samples, (coarse, fine) = run.measured[name], (signals[name][:, 0] for signals in both)
+            samples = run.measured[name]
+            coarse, fine = (signals[name][:, 0] for signals in both)
             error = (fine - coarse) / (1.0 - _FINER)
             error = error if np.isfinite(error).all() else np.zeros_like(error)
             floor = max(experiment.noise.get(name, 0.0), float(np.sqrt(np.mean(np.square(error)))))

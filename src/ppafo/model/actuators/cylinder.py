@@ -13,8 +13,9 @@ from ppafo.model.elementary import TURN, TURNS_OF_RADIAN, sine_and_cosine_of_tur
 
 LEAST_SINE = 0.05
 """Smallest sine of the angle between lever and base; below it the lever is too close to its dead centre."""
-_ROD, _OFFSET = 2.0, 5.0
-"""Places of settings, from 1."""
+# Places of settings, from 1.
+_ROD = 2.0
+_OFFSET = 5.0
 
 
 class Cylinder(NamedTuple):
@@ -89,8 +90,11 @@ class _CylinderSettings(NamedTuple):
 
 def prepare(settings: _CylinderSettings, stops: Range) -> Cylinder:
     """Geometry of the cylinder from settings and stops."""
-    bore, rod = settings.bore, settings.rod_diameter
-    lever, base, offset = settings.lever_length, settings.base_distance, settings.lever_offset
+    bore = settings.bore
+    rod = settings.rod_diameter
+    lever = settings.lever_length
+    base = settings.base_distance
+    offset = settings.lever_offset
     quarter = 0.25 * math.pi
     return Cylinder(
         piston_area=quarter * bore * bore,
@@ -107,7 +111,8 @@ def prepare(settings: _CylinderSettings, stops: Range) -> Cylinder:
 
 def flaw(settings: _CylinderSettings, stops: Range) -> float:
     """Return the place of the setting that is impossible, from 1: rod as wide as the bore, lever at its dead centre."""
-    low, high = stops.angle_min + settings.lever_offset, stops.angle_max + settings.lever_offset
+    low = stops.angle_min + settings.lever_offset
+    high = stops.angle_max + settings.lever_offset
     # Both stops suffice: between them the angle runs from one to the other, and the sine has no minimum inside.
     first, _ = sine_and_cosine_of_turns(low * TURNS_OF_RADIAN)
     last, _ = sine_and_cosine_of_turns(high * TURNS_OF_RADIAN)

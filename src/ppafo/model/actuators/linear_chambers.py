@@ -61,6 +61,7 @@ def linear_torque(
     plant: ShapedPlant, chamber_1: LinearChamber, chamber_2: LinearChamber, pressure_1: float, pressure_2: float
 ) -> float:
     """Torque dPhi/dangle [N m] of both chambers at two absolute pressures [Pa]."""
-    gauge_1, gauge_2 = pressure_1 - plant.atmospheric_pressure, pressure_2 - plant.atmospheric_pressure
+    gauge_1 = pressure_1 - plant.atmospheric_pressure
+    gauge_2 = pressure_2 - plant.atmospheric_pressure
     torque_1 = gauge_1 * (chamber_1.rest_slope + 0.5 * chamber_1.compliance_slope * gauge_1)
     return torque_1 + gauge_2 * (chamber_2.rest_slope + 0.5 * chamber_2.compliance_slope * gauge_2)

@@ -12,9 +12,11 @@ from ppafo.model.actuators.kind import ActuatorKind, ActuatorModel, Chambers, Ra
 from ppafo.model.actuators.linear_chambers import LinearChamber, pressure_in
 from ppafo.model.declaration import Number
 
-BENDS, RISES = 8, 4
-"""Number of inner knots of the splines in the angle, and number of intervals between measured pressures."""
-MOST_ANGLES, MOST_PRESSURES = BENDS + 4, RISES + 1
+# Number of inner knots of the splines in the angle, and number of intervals between measured pressures.
+BENDS = 8
+RISES = 4
+MOST_ANGLES = BENDS + 4
+MOST_PRESSURES = RISES + 1
 
 
 class Curve(NamedTuple):
@@ -75,14 +77,25 @@ def bases_at(table: Table, angle: float) -> tuple[Curve, Curve]:
     """Spline basis of a table at an angle [rad], for the value [-] and the slope [1/rad]."""
     # Truncated powers: the cube of max(share - bend, 0) begins at its bend with two continuous derivatives.
     share = (angle - table.first_angle) * table.per_angle
-    square, per = share * share, table.per_angle
+    square = share * share
+    per = table.per_angle
     at = table.bends
-    d0, d1 = max(share - at[0], 0.0), max(share - at[1], 0.0)
-    d2, d3 = max(share - at[2], 0.0), max(share - at[3], 0.0)
-    d4, d5 = max(share - at[4], 0.0), max(share - at[5], 0.0)
-    d6, d7 = max(share - at[6], 0.0), max(share - at[7], 0.0)
-    s0, s1, s2, s3 = d0 * d0, d1 * d1, d2 * d2, d3 * d3
-    s4, s5, s6, s7 = d4 * d4, d5 * d5, d6 * d6, d7 * d7
+    d0 = max(share - at[0], 0.0)
+    d1 = max(share - at[1], 0.0)
+    d2 = max(share - at[2], 0.0)
+    d3 = max(share - at[3], 0.0)
+    d4 = max(share - at[4], 0.0)
+    d5 = max(share - at[5], 0.0)
+    d6 = max(share - at[6], 0.0)
+    d7 = max(share - at[7], 0.0)
+    s0 = d0 * d0
+    s1 = d1 * d1
+    s2 = d2 * d2
+    s3 = d3 * d3
+    s4 = d4 * d4
+    s5 = d5 * d5
+    s6 = d6 * d6
+    s7 = d7 * d7
     three = 3.0 * per
     return (
         Curve(
@@ -98,7 +111,10 @@ def bases_at(table: Table, angle: float) -> tuple[Curve, Curve]:
 
 def curve_value(curve: Curve, basis: Curve) -> float:
     """Value of a spline, or its slope, for the basis at an angle."""
-    a, b, c, d = curve.powers, basis.powers, curve.bends, basis.bends
+    a = curve.powers
+    b = basis.powers
+    c = curve.bends
+    d = basis.bends
     smooth = (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3])
     low = (c[0] * d[0] + c[1] * d[1]) + (c[2] * d[2] + c[3] * d[3])
     return smooth + (low + ((c[4] * d[4] + c[5] * d[5]) + (c[6] * d[6] + c[7] * d[7])))
@@ -111,7 +127,8 @@ def level_of(curve: Curve, bases: tuple[Curve, Curve]) -> Level:
 
 def levels_of(chamber: TabulatedChamber, bases: tuple[Curve, Curve], dead_volume: float) -> tuple[Level, ...]:
     """Volume of a chamber with its dead volume [m^3] at the lowest pressure, and gain of each pressure interval."""
-    lowest, rises = level_of(chamber.lowest, bases), chamber.rises
+    lowest = level_of(chamber.lowest, bases)
+    rises = chamber.rises
     return (
         Level(lowest.volume + dead_volume, lowest.slope),
         level_of(rises[0].gain, bases),
@@ -197,7 +214,9 @@ def chambers(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: fl
     """Volumes and compliances of both chambers at an angle [rad] and two absolute pressures [Pa]."""
     shape: Measured = plant.shape
     room = plant.atmospheric_pressure
-    first, second, bases = shape.table.chamber_1, shape.table.chamber_2, bases_at(shape.table, angle)
+    first = shape.table.chamber_1
+    second = shape.table.chamber_2
+    bases = bases_at(shape.table, angle)
     levels_1 = levels_of(first, bases, shape.dead_volume_1)
     levels_2 = levels_of(second, bases, shape.dead_volume_2)
     return Chambers(
@@ -212,7 +231,9 @@ def pressures(plant: ShapedPlant, angle: float, mass_1: float, mass_2: float) ->
     """Absolute pressures [Pa] of both chambers for two masses [kg]. Equation (3)."""
     shape: Measured = plant.shape
     room = plant.atmospheric_pressure
-    first, second, bases = shape.table.chamber_1, shape.table.chamber_2, bases_at(shape.table, angle)
+    first = shape.table.chamber_1
+    second = shape.table.chamber_2
+    bases = bases_at(shape.table, angle)
     return (
         pressure_at(first, levels_of(first, bases, shape.dead_volume_1), mass_1 * plant.gas_product, room),
         pressure_at(second, levels_of(second, bases, shape.dead_volume_2), mass_2 * plant.gas_product, room),
@@ -223,7 +244,9 @@ def torque(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: floa
     """Torque [N m] of both chambers at two absolute pressures [Pa], and of the passive stiffness."""
     shape: Measured = plant.shape
     room = plant.atmospheric_pressure
-    first, second, bases = shape.table.chamber_1, shape.table.chamber_2, bases_at(shape.table, angle)
+    first = shape.table.chamber_1
+    second = shape.table.chamber_2
+    bases = bases_at(shape.table, angle)
     # A dead volume does not change with the angle, so it gives no torque: 0 stands for it.
     active_1 = chamber_torque(first, levels_of(first, bases, 0.0), pressure_1 - room)
     active_2 = chamber_torque(second, levels_of(second, bases, 0.0), pressure_2 - room)

@@ -46,7 +46,8 @@ def sensor_readings(
     angle: float, pressure_1: float, pressure_2: float, bandwidth: _SensorRates, bandwidth_state: _SensorState
 ) -> tuple[float, float, float]:
     """Sensor readings of angle [rad] and absolute pressures [Pa]; a sensor without a bandwidth reads the true value."""
-    follows_angle, follows_pressure = bandwidth.angle > 0.0, bandwidth.pressure > 0.0
+    follows_angle = bandwidth.angle > 0.0
+    follows_pressure = bandwidth.pressure > 0.0
     true_angle, true_1, true_2 = shown_signals(angle, pressure_1, pressure_2)
     return (
         bandwidth_state.angle if follows_angle else true_angle,

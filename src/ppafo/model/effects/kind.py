@@ -162,7 +162,8 @@ def _problems(effect: Effect) -> Iterator[str]:
         if effect.is_on(effect.defaults()):
             yield "is on with its defaults; give defaults with which the effect is off"
     for port, law in effect.laws.items():
-        given, taken = _parameters(port), [name for name in _parameters(law) if name not in effect.rows]
+        given = _parameters(port)
+        taken = [name for name in _parameters(law) if name not in effect.rows]
         if taken != given:
             yield f"{law.__name__}({', '.join(taken)}) must take the arguments of {port.__name__}: ({', '.join(given)})"
 
@@ -187,7 +188,8 @@ def laws_in_order(effects: Sequence[Effect]) -> dict[Any, Any]:
                 )
             # A law that calls its port gets what stood there before it.
             found[law, port] = found.get(port, port)
-            found[port], last[port] = law, effect
+            found[port] = law
+            last[port] = effect
     return found
 
 

@@ -25,7 +25,8 @@ def leak_with_gap(
     Near equal pressures both 1 - r and psi are linear and go to zero; their quotient is the one at the end of the
     linear region.
     """
-    upstream, downstream = max(pressure_1, pressure_2), min(pressure_1, pressure_2)
+    upstream = max(pressure_1, pressure_2)
+    downstream = min(pressure_1, pressure_2)
     ratio = min(downstream / upstream, curve.linear_ratio)
     function, _ = fitted_flow_function(ratio, curve)
     gap = laminar_leak.coefficient * (upstream + downstream) * (1.0 - ratio) / function

@@ -25,7 +25,8 @@ class LineSettings(NamedTuple):
 
 def prepare(settings: LineSettings, device: Any) -> LineResistance:
     """Parameters of an orifice with the pressure drop of a line, for the gas of the device. Equation (6)."""
-    area, gas = settings.area, device.gas
+    area = settings.area
+    gas = device.gas
     conductance = area_conductance(
         area, settings.discharge_coefficient, gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature
     )

@@ -37,7 +37,8 @@ class StribeckSettings(NamedTuple):
 
 def prepare(settings: StribeckSettings, device: Any) -> Stribeck:
     """Parameters from the Stribeck velocity and the friction of the device."""
-    velocity, friction = settings.velocity, device.friction
+    velocity = settings.velocity
+    friction = device.friction
     scale = 1.0 / (velocity * velocity) if velocity > 0.0 else 0.0
     return Stribeck(settings.share * (friction.static_torque - friction.dynamic_torque), scale)
 

@@ -82,7 +82,8 @@ def valve_problem(valve: ValveModel) -> str:
         return (
             f"a run begins with the defaults of its state: give those of {valve.state.__name__}: {', '.join(without)}"
         )
-    shown, connect = valve.shown, valve.connect.__name__
+    shown = valve.shown
+    connect = valve.connect.__name__
     if not (shown is float or hasattr(shown, "_fields")):
         return f"{connect}: annotate its second parameter with the class of the output, float or a NamedTuple"
     given = (*get_args(get_type_hints(valve.advance).get("return")), None)[0]

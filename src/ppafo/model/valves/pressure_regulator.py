@@ -132,7 +132,8 @@ def advance(
 ) -> tuple[SetPressures, RegulatorState]:
     """Set pressures [Pa] during a step [s] with a constant command [-], and the state at its end."""
     begun = settle(valve, state, command, time)
-    target_1, target_2 = target_of(valve, begun.command_1), target_of(valve, begun.command_2)
+    target_1 = target_of(valve, begun.command_1)
+    target_2 = target_of(valve, begun.command_2)
     kept, mean = decay_factors(valve.rate, step)
     end_1 = target_1 + kept * (begun.set_1 - target_1)
     end_2 = target_2 + kept * (begun.set_2 - target_2)
@@ -153,8 +154,10 @@ def regulated_ports(
 ) -> tuple[RegulatedPort, RegulatedPort]:
     """Ports of both chambers for their set pressures and a band [Pa]."""
     # Lines narrow the open path; a part of it has the same share of what they leave.
-    supply, exhaust = supply_path(plant.valve_conductance), exhaust_path(plant.valve_conductance)
-    room, back = plant.atmospheric_pressure, plant.relieving
+    supply = supply_path(plant.valve_conductance)
+    exhaust = exhaust_path(plant.valve_conductance)
+    room = plant.atmospheric_pressure
+    back = plant.relieving
     return (
         RegulatedPort(supply, plant.supply_pressure, exhaust, room, back, set_1, band),
         RegulatedPort(supply, plant.dorsiflexion_pressure, exhaust, room, back, set_2, band),
@@ -174,7 +177,8 @@ def connect_ahead(plant: PlantParameters, shown: SetPressures) -> tuple[Regulate
 def regulated_port_flow(pressure: float, port: RegulatedPort, curve: FlowCurve) -> tuple[PortFlow, PortSlopes]:
     """Flow into a chamber at ``pressure`` [Pa absolute] through its regulator, and its derivatives. Eqs (6) to (8)."""
     opening = (port.set_pressure - pressure) / port.band
-    fed, vented = max(min(opening, 1.0), 0.0), max(min(-opening, 1.0), 0.0)
+    fed = max(min(opening, 1.0), 0.0)
+    vented = max(min(-opening, 1.0), 0.0)
     # The flows of open paths: the derivative has that of the opening, too.
     open_source = SinglePort(port.source_conductance, port.source_pressure, 1.0, port.is_relieving)
     open_vent = SinglePort(port.vent_conductance, port.vent_pressure, 0.0, 1.0)
@@ -182,7 +186,8 @@ def regulated_port_flow(pressure: float, port: RegulatedPort, curve: FlowCurve) 
     vent, by_vent = single_port_flow(pressure, open_vent, curve)
     narrowing = source.total / port.band if fed > 0.0 and fed < 1.0 else 0.0
     widening = vent.total / port.band if vented > 0.0 and vented < 1.0 else 0.0
-    from_source, slope = fed * source.total, fed * by_source.total - narrowing
+    from_source = fed * source.total
+    slope = fed * by_source.total - narrowing
     return PortFlow(from_source + vented * vent.total, from_source), PortSlopes(
         slope + vented * by_vent.total + widening, slope
     )

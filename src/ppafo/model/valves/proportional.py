@@ -131,7 +131,8 @@ def advance_moving(
     by = spool_step(angular, valve.damping_ratio, step)
     # A spool that follows a ramp stays behind it by this much, and moves freely about that.
     behind = 2.0 * valve.damping_ratio * slew / angular if has_spool else 0.0
-    away, rate_away = settled.opening - settled.requested + behind, settled.rate - slew
+    away = settled.opening - settled.requested + behind
+    rate_away = settled.rate - slew
     spool = requested - behind + by.next_by_opening * away + by.next_by_rate * rate_away
     spool_mean = requested_mean - behind + by.mean_by_opening * away + by.mean_by_rate * rate_away
     rate = slew + by.rate_by_opening * away + by.rate_by_rate * rate_away
@@ -213,13 +214,21 @@ def spool_step(angular: float, damping_ratio: float, step: float) -> SpoolStep:
     fraction = min(1.0, ARRIVAL * slower / max(angular * step, TINY))
     moving = fraction * step
     small = angular * moving * SMALLEST_FRACTION
-    trace, determinant = -2.0 * damping_ratio * small, small * small
+    trace = -2.0 * damping_ratio * small
+    determinant = small * small
     # A^n = p + q A, term by term: the next is A times this one.
-    p, q, exp_p, exp_q, mean_p, mean_q = 1.0, 0.0, 1.0, 0.0, 1.0, 0.0
+    p = 1.0
+    q = 0.0
+    exp_p = 1.0
+    exp_q = 0.0
+    mean_p = 1.0
+    mean_q = 0.0
     for order in range(1, TERMS):
         p, q = -determinant * q / order, (p + trace * q) / order
-        exp_p, exp_q = exp_p + p, exp_q + q
-        mean_p, mean_q = mean_p + p / (order + 1), mean_q + q / (order + 1)
+        exp_p = exp_p + p
+        exp_q = exp_q + q
+        mean_p = mean_p + p / (order + 1)
+        mean_q = mean_q + q / (order + 1)
     for _ in range(DOUBLINGS):
         # The mean over twice the step is half of (1 + exp) times the mean over the step.
         both = exp_q * mean_q
@@ -278,7 +287,8 @@ def dead_time(settings: ProportionalSettings) -> float:
 def lag(settings: ProportionalSettings) -> float:
     """Time [s] until the opening has followed a command: dead time, spool, and travel at the slew limit."""
     # Mean delay of a second-order system: 2 d / w.
-    frequency, slew_limit = settings.spool_frequency, settings.slew_limit
+    frequency = settings.spool_frequency
+    slew_limit = settings.slew_limit
     spool = 2.0 * settings.spool_damping_ratio / (2.0 * math.pi * frequency) if frequency > 0.0 else 0.0
     slew = 1.0 / slew_limit if slew_limit > 0.0 else 0.0
     return settings.delay + (spool + slew)

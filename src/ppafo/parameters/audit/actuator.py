@@ -17,8 +17,11 @@ from ppafo.parameters.reach import torque_reach
 from ppafo.units import from_si, to_si
 from ppafo.units.shown import shown_in, shown_unit, shown_value
 
-_INERTIA, _DAMPING, _FRICTION = "foot_plate.inertia", "friction.viscous_damping", "friction.dynamic_torque"
-_DECAY, _DECAY_INVERSE = "reported.acceleration_over_velocity", "reported.velocity_over_acceleration"
+_INERTIA = "foot_plate.inertia"
+_DAMPING = "friction.viscous_damping"
+_FRICTION = "friction.dynamic_torque"
+_DECAY = "reported.acceleration_over_velocity"
+_DECAY_INVERSE = "reported.velocity_over_acceleration"
 _DECELERATION = "reported.stopping_deceleration"
 _SHIFTS = (-3, -2, -1, 1, 2, 3)
 """Powers of ten of a misplaced decimal point or a wrong prefix."""
@@ -26,13 +29,15 @@ _STOPS = ("actuator.angle_min", "actuator.angle_max")
 _DEAD = ("actuator.dead_volume_1", "actuator.dead_volume_2")
 _LEVER = ("actuator.lever_length", "actuator.base_distance", "actuator.lever_offset")
 _SUPPLIES = ("supply.pressure", "supply.dorsiflexion_pressure", "reported.other_supply_pressure")
-_DEMAND, _STATIC = "reported.demanded_torque", "friction.static_torque"
+_DEMAND = "reported.demanded_torque"
+_STATIC = "friction.static_torque"
 _TOLERANCE = 0.1
 """Relative difference [-] from which two reported numbers of one or two digits differ for certain."""
 _SAME_TURN = 1.01
 """Ratio of two turns that the rounding of reported angles leaves open [-]."""
-_LEAST, _MOST = 0.6, 1.1
-"""Accepted ratio of the gas of one filling to the measured gas use [-]; the remainder leaks during the task."""
+# Accepted ratio of the gas of one filling to the measured gas use [-]; the remainder leaks during the task.
+_LEAST = 0.6
+_MOST = 1.1
 _FELT_TORQUE = 0.01
 """Standard deviation of the torque, relative to the largest one [-], from which a rounded table is a warning."""
 _REACHED = 0.9
@@ -70,7 +75,8 @@ def inertia(evidence: Evidence) -> Iterator[AuditFinding]:
         if of_inertia is None or reported is None or rate is None or of_inertia.times(rate).meets(reported):
             continue
         agreeing.append(reported.over(rate))
-        (stated, number), unit = evidence.numbers(_INERTIA, product), evidence.declared[product].unit
+        stated, number = evidence.numbers(_INERTIA, product)
+        unit = evidence.declared[product].unit
         yield evidence.finding(
             f"{name.replace(' ', '-')}-against-inertia",
             f"{name} is not the product of inertia and the reported ratio",
@@ -84,7 +90,8 @@ def inertia(evidence: Evidence) -> Iterator[AuditFinding]:
     # Only if both products disagree with the reported inertia.
     if len(agreeing) > 1 and agreeing[0].meets(agreeing[1]):
         lows, highs = zip(*agreeing, strict=True)
-        common, (stated,) = ReportedRange(max(lows), min(highs)), evidence.numbers(_INERTIA)
+        common = ReportedRange(max(lows), min(highs))
+        (stated,) = evidence.numbers(_INERTIA)
         # A moved decimal point is the most likely error; otherwise the middle of the common range.
         moved = [number for shift in _SHIFTS if common.low <= (number := stated * 10.0**shift) <= common.high]
         reconciling = moved[0] if moved else _middle(common)
@@ -113,7 +120,8 @@ def _one_filling(evidence: Evidence) -> tuple[str, float, float]:
 
     Raises ParameterError if the set reports no such gas, or a supply that fills nothing.
     """
-    gas, (supply,) = evidence.gas(), evidence.numbers(PRESSURE_PATH)
+    gas = evidence.gas()
+    (supply,) = evidence.numbers(PRESSURE_PATH)
     paths = (f"reported.valves.{name}.single_fill_gas" for name in evidence.parameter_set.valve_kinds)
     path = next((path for path in paths if evidence.number(path)), "")
     if supply <= evidence.atmosphere() or not path:
@@ -128,7 +136,8 @@ def virtual_work(evidence: Evidence) -> Iterator[AuditFinding]:
     Equations (2) to (5): by virtual work, T dtheta = (P1 - P2) dV, both are equal.
     """
     paths = [TORQUE_CONSTANT_PATH, DISPLACEMENT_PATH, "reported.torque_efficiency"]
-    (constant, displacement), efficiency = evidence.positive(*paths[:2]), evidence.number(paths[2])
+    constant, displacement = evidence.positive(*paths[:2])
+    efficiency = evidence.number(paths[2])
     if efficiency is not None and abs(displacement * efficiency / constant - 1.0) <= _TOLERANCE:
         yield evidence.finding(
             "virtual-work",
@@ -166,7 +175,8 @@ def virtual_work(evidence: Evidence) -> Iterator[AuditFinding]:
 
 def volumes(evidence: Evidence) -> Iterator[AuditFinding]:
     """Name each chamber whose volume is not positive at one end of the angles in use; equations (4) and (5)."""
-    (slope,), (stop_low, stop_high) = evidence.positive(DISPLACEMENT_PATH), evidence.numbers(*_STOPS)
+    (slope,) = evidence.positive(DISPLACEMENT_PATH)
+    stop_low, stop_high = evidence.numbers(*_STOPS)
     low_path, low, high_path, high = evidence.angle_range()
     turn = high - low
     for index, (travel, path, end) in enumerate(((low - stop_low, low_path, low), (stop_high - high, high_path, high))):
@@ -214,7 +224,8 @@ def rounded_table(evidence: Evidence) -> Iterator[AuditFinding]:
 
 def rotation(evidence: Evidence) -> Iterator[AuditFinding]:
     """Warn of a range of angles larger than the actuator's designation."""
-    (rated,), (low_path, low, high_path, high) = evidence.numbers("reported.rated_rotation"), evidence.angle_range()
+    (rated,) = evidence.numbers("reported.rated_rotation")
+    low_path, low, high_path, high = evidence.angle_range()
     if high - low > _SAME_TURN * rated:
         yield evidence.finding(
             "rotation",
@@ -231,7 +242,8 @@ def stroke(evidence: Evidence) -> Iterator[AuditFinding]:
     lever, base, *stops = evidence.numbers(*_LEVER[:2], *_STOPS)
     low, high = (stop + (evidence.number(_LEVER[2]) or 0.0) for stop in stops)
     if 0.0 < low < high < math.pi:
-        (shortest, first_arm), (longest, last_arm) = pins_at(lever, base, low), pins_at(lever, base, high)
+        shortest, first_arm = pins_at(lever, base, low)
+        longest, last_arm = pins_at(lever, base, high)
         sides = {
             "distance of the pins at the lower stop": shortest,
             "distance of the pins at the upper stop": longest,

@@ -21,8 +21,9 @@ from ppafo.units.shown import shown_unit
 from ppafo.units.spelling import DECIMALS
 
 Severity = Literal["error", "warning", "note"]
-_SMALLEST, _LARGEST = 1e-20, 1e20
-"""Limits of plausible SI magnitudes; products of larger numbers would overflow."""
+# Limits of plausible SI magnitudes; products of larger numbers would overflow.
+_SMALLEST = 1e-20
+_LARGEST = 1e20
 
 
 @dataclass(frozen=True, slots=True)

@@ -77,7 +77,8 @@ def forms(evidence: Evidence) -> Iterator[AuditFinding]:
 @of_each_valve
 def open_flow(evidence: Evidence, valve: str) -> Iterator[AuditFinding]:
     """Note the flow of a valve with the gas of the set."""
-    (supply,), atmosphere = evidence.numbers("supply.pressure"), evidence.atmosphere()
+    (supply,) = evidence.numbers("supply.pressure")
+    atmosphere = evidence.atmosphere()
     opened = _open_valve(evidence, valve, max(supply, atmosphere), min(supply, atmosphere))
     gas = evidence.gas().species
     way = "atmosphere to vacuum" if supply < atmosphere else "supply to atmosphere"

@@ -19,11 +19,13 @@ from ppafo.parameters.publications.publication import FILE, read_publication
 from ppafo.units import split_number, to_si
 from ppafo.wording import count_of
 
-_C1, _EXPONENT = "reported.choked_flow_constant", "reported.choked_flow_exponent"
+_C1 = "reported.choked_flow_constant"
+_EXPONENT = "reported.choked_flow_exponent"
 _ROUNDING = 1e-3
 """Relative tolerance besides the reported digits [-], for other values of R, M and 273 or 273.15 K."""
-_LONGEST, _LARGEST = 80, 1e3
-"""Largest number of characters of a formula, and largest magnitude of its value."""
+# Largest number of characters of a formula, and largest magnitude of its value.
+_LONGEST = 80
+_LARGEST = 1e3
 _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -32,8 +34,9 @@ _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
 }
 _OF_THE_GAS = 0.02
 """Relative tolerance of a constant of the named gas [-]."""
-_TABULATED, _ROOM = 298.0, 20.0
-"""Temperature of the virial coefficients, and largest distance from it [K]: that of CO2 then changes by 15 %."""
+# Temperature of the virial coefficients, and largest distance from it [K]: that of CO2 then changes by 15 %.
+_TABULATED = 298.0
+_ROOM = 20.0
 _WORTH_A_WARNING = 0.05
 
 
@@ -202,7 +205,8 @@ def flow_constants(evidence: Evidence) -> Iterator[AuditFinding]:
     for path, value in expected.items():
         if (digits := evidence.magnitude(path)) is not None:
             agrees = digits.low * (1.0 - _ROUNDING) <= value <= digits.high * (1.0 + _ROUNDING)
-            quantity, (reported,) = evidence.declared[path], evidence.numbers(path)
+            quantity = evidence.declared[path]
+            (reported,) = evidence.numbers(path)
             yield evidence.finding(
                 identifier_of(path.rpartition(".")[2]),
                 f"{quantity.summary} {'follows' if agrees else 'does not follow'} from the gas data",
@@ -260,7 +264,8 @@ def _value(node: ast.expr, k: float) -> float:
 
 def ideal_gas(evidence: Evidence) -> Iterator[AuditFinding]:
     """Note the error of the ideal gas law at supply pressure, a warning above 5 %; equation (3)."""
-    gas, (pressure,) = evidence.gas(), evidence.numbers("supply.pressure")
+    gas = evidence.gas()
+    (pressure,) = evidence.numbers("supply.pressure")
     virial = SECOND_VIRIAL.get(evidence.text("gas.species"))
     if virial is None or abs(gas.temperature - _TABULATED) > _ROOM:
         return

@@ -71,7 +71,8 @@ class Numbers:
         size, *own = over_runs(own_numbers, period, steps.torque_step, *settings.values())
         numbers = dict(zip((quantity.name for quantity in self.quantities), (*steps, *limits, *own), strict=True))
         top, middle = limits
-        low, high = -middle * steps.torque_step, (top - middle) * steps.torque_step
+        low = -middle * steps.torque_step
+        high = (top - middle) * steps.torque_step
         return numbers, (
             (
                 np.asarray(bits % 1.0 != 0.0),

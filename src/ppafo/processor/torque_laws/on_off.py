@@ -115,7 +115,8 @@ def dead_zone_update(
 def prepare_dead_zone(settings: Mapping[str, float], period: float, torque_step: float) -> tuple[float, ...]:
     """Return the numbers of ``_DeadZoneNumbers`` after the limits, from settings [SI] and torque per count [N m]."""
     # A release beyond the dead zone would close the valve before it opens.
-    zone, release = settings["dead_zone"], min(settings["release"], settings["dead_zone"])
+    zone = settings["dead_zone"]
+    release = min(settings["release"], settings["dead_zone"])
     counts = [float(min(LARGEST_READING, int(torque / torque_step + 0.5))) for torque in (zone, release)]
     return (*counts, float(int(settings["opening"] * COMMAND_STEPS + 0.5)))
 

@@ -29,8 +29,10 @@ from ppafo.wording import nearest_name
 
 _SAME_INTERVAL = 1.0e-6
 """Relative difference up to which two intervals count as the same [-]."""
-COMPLETED, DIVERGED, REFUSED = 0, 1, 2
-"""End of a run of an ensemble; REFUSED for an impossible combination of values."""
+# End of a run of an ensemble; REFUSED for an impossible combination of values.
+COMPLETED = 0
+DIVERGED = 1
+REFUSED = 2
 _ROUNDING = 1.0e-9
 """Relative tolerance for the end of a run that rounding puts before the last time of its traces."""
 

@@ -8,8 +8,10 @@ from ppafo.signals import Recording
 from ppafo.signals.faults import longest_gap
 from ppafo.signals.recording import Floats
 
-COMMAND, SUPPLY, EXTERNAL_TORQUE = "command", "supply_pressure", "external_torque"
-"""Valve command [-], supply pressure [Pa absolute], external torque on the vane [N m]."""
+# Valve command [-], supply pressure [Pa absolute], external torque on the vane [N m].
+COMMAND = "command"
+SUPPLY = "supply_pressure"
+EXTERNAL_TORQUE = "external_torque"
 DORSIFLEXION_SUPPLY = "dorsiflexion_pressure"
 """Supply pressure of chamber 2 [Pa absolute], if each chamber has its own regulator."""
 ANGLE = "angle"

@@ -24,7 +24,8 @@ from ppafo.simulation.recorded.rest import motion_at
 
 _HISTORY = 0.25
 """Time before the start for which a valve follows the recorded commands [s], longer than any dead time."""
-_SUPPLY_PATH, _DORSIFLEXION_PATH = "plant.supply_pressure", "plant.dorsiflexion_pressure"
+_SUPPLY_PATH = "plant.supply_pressure"
+_DORSIFLEXION_PATH = "plant.dorsiflexion_pressure"
 
 
 @dataclass(frozen=True, slots=True)

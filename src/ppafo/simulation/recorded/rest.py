@@ -17,9 +17,12 @@ _FITS = 1.0e-6
 """Rounding tolerance of the time of a start [s]."""
 _WINDOWS = 8, 12, 16, 24, 32, 48, 64
 """Numbers of first samples from which the velocity of a start in motion is found."""
-_FOLLOWED, _SURE, _SEEN, _LEAST_VELOCITY = 1.3, 2.0, 4.0, 0.05
-"""Scatter up to which a cubic follows the samples [noises], factor of the error of its velocity, for the cubic is none
-of the model, and least velocity of a motion: in such errors [-], and beyond them [rad/s]."""
+# Scatter up to which a cubic follows the samples [noises], factor of the error of its velocity, for the cubic is none
+# of the model, and least velocity of a motion: in such errors [-], and beyond them [rad/s].
+_FOLLOWED = 1.3
+_SURE = 2.0
+_SEEN = 4.0
+_LEAST_VELOCITY = 0.05
 REST_WINDOW = 0.05
 """Time before the first command over which the start is averaged [s]; so short that a leak has no effect."""
 _FEWEST_ON_LINE = 8

@@ -29,9 +29,10 @@ _SHORT = 0.1
 """Time below which a text has milliseconds [s]."""
 _FULLY_OPEN = 0.98
 """Command above which a valve counts as fully open [-]."""
-_FULL_FLOW, _HARDLY = 0.9, 0.05
-"""Share of the flow through an open regulator from which it counts as fully open, and share of the largest such flow up
-to which it gives hardly any [-]."""
+# Share of the flow through an open regulator from which it counts as fully open, and share of the largest such flow
+# up to which it gives hardly any [-].
+_FULL_FLOW = 0.9
+_HARDLY = 0.05
 
 
 def stated_number(scenario: Scenario, path: str) -> str:

@@ -29,15 +29,17 @@ from ppafo.simulation.tracking.rule import LEAST_PEAK_WALK, is_pair
 
 HIGHER_SUPPLY = "with a higher supply pressure"
 SMALLER_REFERENCE = "with a smaller reference"
-LARGER_VALVE, SMALLER_VALVE = "with a larger valve", "with a smaller valve"
+LARGER_VALVE = "with a larger valve"
+SMALLER_VALVE = "with a smaller valve"
 CARRYING_START = "with initial pressures that carry the load"
 FASTER_CONTROLLER = "with a faster controller"
 """Words of changes for which a run may have evidence."""
 LOAD = "motion.external_torque"
 QUICKER_ABOVE = ("bandwidth", "frequency", "slew_limit")
 """Ends of the paths of numbers of which more is quicker."""
-_MOSTLY, _OFTEN = 0.5, 0.1
-"""Fractions of the judged samples, or of a delay, that count as most, and as often [-]."""
+# Fractions of the judged samples, or of a delay, that count as most, and as often [-].
+_MOSTLY = 0.5
+_OFTEN = 0.1
 _FINE = 0.1
 """Step of an on/off valve during its dead time divided by the wanted change, up to which it makes no loop fail [-]."""
 _FLUNG = 0.5
@@ -106,7 +108,9 @@ def delays_of(scenario: Scenario) -> dict[str, float]:
     return delays
 
 
-_SPOOL, _DAMPING, _SLEW = "valve.spool_frequency", "valve.spool_damping_ratio", "valve.slew_limit"
+_SPOOL = "valve.spool_frequency"
+_DAMPING = "valve.spool_damping_ratio"
+_SLEW = "valve.slew_limit"
 _DELAYS = (
     "sensors.delay",
     "sensors.pressure_bandwidth",
@@ -234,7 +238,9 @@ def stop_of(scenario: Scenario, angle: Floats) -> str:
 
 def _flung_at_start(case: Case) -> str:
     """Clause: the initial pressures do not carry the load, which throws the joint off; "" if it is not thrown off."""
-    device, initial, (reference, angle) = case.device, case.scenario.initial, followed(case.recording)
+    device = case.device
+    initial = case.scenario.initial
+    reference, angle = followed(case.recording)
     start = float(angle[0])
     if case.oscillates or (load := _load_at(case, start)) is None:
         return ""

@@ -75,8 +75,9 @@ LARGEST_PEAK_WALK = 1.5
 """Peak torque of a walk divided by the torque limit of its controller, or by the largest requested torque [-]."""
 LEAST_PEAK_WALK = 0.7
 """Largest torque of a walk in plantarflexion divided by the largest requested one; with less it does not follow [-]."""
-MOST_PER_STRIDE, MOST_PER_SECOND = 12.0, 10.0
-"""Command reversals per stride and per second above which a loop oscillates."""
+# Command reversals per stride and per second above which a loop oscillates.
+MOST_PER_STRIDE = 12.0
+MOST_PER_SECOND = 10.0
 _TINY = 1.0e-300
 """Divisor in place of 0."""
 PER_TURN = 2.0
@@ -185,7 +186,9 @@ def task_parts(scenario: Scenario, recording: Recording) -> list[SettledPart]:
 
     They are those of a run without recording: its settled meter is fed with the recorded samples.
     """
-    (reference, value), time, count = followed(recording), recording.time, len(recording)
+    reference, value = followed(recording)
+    time = recording.time
+    count = len(recording)
     duration = float(time[-1] - time[0])
     interval = duration / (count - 1)
     largest = extent(recording)

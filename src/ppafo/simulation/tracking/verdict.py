@@ -61,8 +61,9 @@ from ppafo.wording import override_text, without_exponent
 if TYPE_CHECKING:
     from ppafo.simulation.at_hand import RecordedResult
 
-_FEWEST_SAMPLES, _SAMPLES_ADVISED = 8, 100
-"""Smallest number of samples of a recording for a verdict, and number of samples that a remedy gives it."""
+# Smallest number of samples of a recording for a verdict, and number of samples that a remedy gives it.
+_FEWEST_SAMPLES = 8
+_SAMPLES_ADVISED = 100
 _UNLIMITED = 1.0
 """Limit divided by the wanted change, from which it is none to speak of [-]."""
 _LEAST = 1.0e-9
@@ -71,8 +72,10 @@ _MOST_DOUBLINGS = 11
 """Number of durations that are looked at for a reference that rests, each twice the one before."""
 
 
-OPEN_LOOP, NO_REFERENCE, TOO_SHORT = "open loop", "no reference", "too short"
-"""Reasons for no verdict."""
+# Reasons for no verdict.
+OPEN_LOOP = "open loop"
+NO_REFERENCE = "no reference"
+TOO_SHORT = "too short"
 _LOCKED = ("motion.kind=locked",)
 """Remedy for a free joint that nothing resists."""
 _Judged = tuple[Criterion, float, float]

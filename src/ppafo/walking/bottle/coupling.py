@@ -164,8 +164,9 @@ def strides_text(strides: float) -> str:
     return f"{strides:.1f}" if strides < 99.5 else f"{strides:.0f}"
 
 
-REGULATED, _LINE = "line_state.regulated_mass", "line_state.mass_1"
-"""Paths of the rows for the gas through a line's regulator, and for the gas in the line [kg]."""
+# Paths of the rows for the gas through a line's regulator, and for the gas in the line [kg].
+REGULATED = "line_state.regulated_mass"
+_LINE = "line_state.mass_1"
 
 _PARAMETERS = (
     "plant.gas_product",

@@ -22,10 +22,13 @@ _GHOST = "#5a5a5a"
 _DRAGS = "#a4001d"
 """Colour of the cross on toes that would drag."""
 
-_WIDTH, _EDGE, _HEAD = 5.7, 0.015, 0.66
-"""Width of the figure [inch], margin at its sides [widths], and height of its title and remark [inch]."""
-_FRAMES, _FEW_FRAMES = 10, 5
-"""Number of legs in the picture of one stride, and in a narrower one."""
+# Width of the figure [inch], margin at its sides [widths], and height of its title and remark [inch].
+_WIDTH = 5.7
+_EDGE = 0.015
+_HEAD = 0.66
+# Number of legs in the picture of one stride, and in a narrower one.
+_FRAMES = 10
+_FEW_FRAMES = 5
 _SLOT = 0.62
 """Width of the ground under one frame [m]."""
 _VIEW = (-0.36, 0.86)

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WITH, WITHOUT, HEALTHY = BLUE, VERMILION, BLACK
+WITH = BLUE
+WITHOUT = VERMILION
+HEALTHY = BLACK
 OPACITY = MappingProxyType({WITH: 1.0, WITHOUT: 0.5})
 """Opacity of the lines of both walks: without the device they are paler, in greyscale too."""
 STRIDE = Kind("Stride", "1", "fraction")
@@ -77,8 +79,12 @@ def walk_figure(walks: Mapping[str, Any]) -> "Figure":
         if kind in healthy:
             mean, deviation = healthy[kind]
             look = {"linewidth": 1.2, "linestyle": (0, (1, 1.2))}
-            marks.append(Mark("line", PHASES, mean, label="healthy gait", colour=HEALTHY, style=look))
-            marks.append(replace(_band(mean, deviation, GREY, 0.15), label="band: standard deviation"))
+            marks.extend(
+                (
+                    Mark("line", PHASES, mean, label="healthy gait", colour=HEALTHY, style=look),
+                    replace(_band(mean, deviation, GREY, 0.15), label="band: standard deviation"),
+                )
+            )
         shown = ONE_PRESSURE if kind is PRESSURE and has_one_chamber else kind
         panels.append(Panel(STRIDE, shown, marks, legend="", then=whole_stride, shares_x=True))
     panels[0] = replace(panels[0], legend="figure")

@@ -97,7 +97,8 @@ class MuscleSettings(NamedTuple):
 
 def prepare(settings: MuscleSettings, stops: Range) -> MusclePair:
     """Numbers of the pair."""
-    thread, turns = settings.thread_length, settings.turns
+    thread = settings.thread_length
+    turns = settings.turns
     return MusclePair(
         thread_square=thread * thread,
         per_turns=1.0 / (4.0 * math.pi * turns * turns),
@@ -113,7 +114,9 @@ def prepare(settings: MuscleSettings, stops: Range) -> MusclePair:
 def problem(settings: MuscleSettings, stops: Range) -> str:
     """A muscle that would be longer than its threads, or shorter than where it pulls, between the stops."""
     farthest = max(abs(angle - settings.neutral_angle) for angle in (stops.angle_min, stops.angle_max))
-    length, way, thread = settings.muscle_length, settings.pulley_radius * farthest, settings.thread_length
+    length = settings.muscle_length
+    way = settings.pulley_radius * farthest
+    thread = settings.thread_length
     if FULLY_SHORT * thread < length - way and length + way < thread:
         return ""
     return (

@@ -36,7 +36,8 @@ _UNITS = {
 
 _GROUPS = (("ANGLES", "ANGLE_UNITS"), ("MOMENTS", "MOMENT_UNITS"), ("FORCES", "FORCE_UNITS"))
 
-_BODY, _HEIGHT = ("Bodymass", "BODYMASS", "BodyMass"), ("Height", "HEIGHT")
+_BODY = ("Bodymass", "BODYMASS", "BodyMass")
+_HEIGHT = ("Height", "HEIGHT")
 
 
 def read_c3d(path: str | Path) -> MotionTable:
@@ -88,7 +89,8 @@ def read_c3d(path: str | Path) -> MotionTable:
                 columns[name] = analogs[row, ::step][:frames]
                 units[name] = _unit_name(stated[row]) if row < len(stated) else ""
     for name, values in _plates(content, frames):
-        columns[name], units[name] = values, "N"
+        columns[name] = values
+        units[name] = "N"
     # A trial that was cut keeps its clock: events count from the beginning of the capture.
     first = max(0, int(content["header"]["points"].get("first_frame", 0)))
     subject = parameters.get("PROCESSING", {})

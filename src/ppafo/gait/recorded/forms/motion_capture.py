@@ -19,14 +19,16 @@ from ppafo.gait.recorded.table import AXES, MotionTable, bare_label
 from ppafo.signals.recording import Floats
 from ppafo.wording import LONGEST_SHOWN, one_line
 
-_NEXUS_MOTION, _NEXUS_DEVICES = ("Trajectories", "Model Outputs"), "Devices"
-"""Block titles of a Nexus export: markers and model outputs; then force plates and other analog channels."""
+# Block titles of a Nexus export: markers and model outputs; then force plates and other analog channels.
+_NEXUS_MOTION = ("Trajectories", "Model Outputs")
+_NEXUS_DEVICES = "Devices"
 _LENGTHS = {"Meters": "m", "Centimeters": "cm", "Millimeters": "mm"}
 _MOTIVE_ROWS = 3
 """Least number of rows above the axes of a Motive export: types, names and quantities."""
 _DFLOW = {"Pos": "m", "Cop": "m", "For": "N", "Mom": "N m"}
-_TRC, _TRC_ROWS = "PathFileType", 5
-"""First word of a TRC file, and number of lines before its first row."""
+# First word of a TRC file, and number of lines before its first row.
+_TRC = "PathFileType"
+_TRC_ROWS = 5
 _NUMBER = re.compile(r"[+-]?\.?\d|nan", re.IGNORECASE)
 """Pattern of the start of a numeric cell."""
 _DFLOW_COLUMN = re.compile(r"(.+)\.(Pos|Cop|For|Mom)([XYZ])")
