@@ -2,7 +2,7 @@
 
 import contextlib
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 
 _LONG_WORD = re.compile(r"([^\s/\\]{60})[^\s/\\]{40,}|(\S{200})\S{400,}")
 """Word longer than any that this package writes: a name or a value of somebody else."""
@@ -87,23 +87,30 @@ def refused_as(kind: Callable[[str], PpafoError], place: object, *caught: type[B
         raise kind(f"{place}: {' '.join(str(error).split())}") from error
 
 
-@contextlib.contextmanager
-def noted_in(found: list[PpafoError]) -> Iterator[None]:
-    """Append an error raised in a ``with`` block to a list, for ``raise_noted``, and continue."""
-    try:
-        yield
-    except PpafoError as error:
-        found.append(error)
+class Faults(list[PpafoError]):
+    """Errors of independent checks, collected so that all of them are raised together.
 
+    A ``with`` block of the list is one check: its error is kept, and the next check is made.
+    """
 
-def raise_noted(found: Sequence[PpafoError]) -> None:
-    """Raise a PpafoError of the class of the first error, with all messages of a list."""
-    parts = tuple(dict.fromkeys(part for error in found for part in error.parts or (str(error),)))
-    if len(parts) == 1:
-        # One alone keeps its traceback and its class.
-        raise found[0]
-    if parts:
-        listed = "; ".join(f"({number}) {part}" for number, part in enumerate(parts, 1))
-        several = type(found[0])(f"{len(parts)} things are wrong: {listed}")
-        several.parts = parts
-        raise several
+    def __enter__(self) -> None:
+        """Begin a check."""
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
+        """Keep the error of a check. Returns True if there is one."""
+        if not isinstance(error, PpafoError):
+            return False
+        self.append(error)
+        return True
+
+    def raise_all(self) -> None:
+        """Raise a PpafoError of the class of the first error, with all messages; nothing without an error."""
+        parts = tuple(dict.fromkeys(part for error in self for part in error.parts or (str(error),)))
+        if len(parts) == 1:
+            # One alone keeps its traceback and its class.
+            raise self[0]
+        if parts:
+            listed = "; ".join(f"({number}) {part}" for number, part in enumerate(parts, 1))
+            several = type(self[0])(f"{len(parts)} things are wrong: {listed}")
+            several.parts = parts
+            raise several

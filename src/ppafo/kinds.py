@@ -17,7 +17,7 @@ from functools import lru_cache, partial
 from types import CodeType, FunctionType
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from ppafo.errors import KindError, PpafoError, noted_in
+from ppafo.errors import Faults, KindError
 from ppafo.plugins import OBJECT, is_working_folder, named_kinds, object_of, without_working_folder
 from ppafo.wording import one_line, place
 
@@ -103,13 +103,13 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         # A module may be named in two ways, and its components are loaded once.
         loaded = {getattr(kind, "name", name) for name, kind in self._kinds.items()}
         named = named_kinds(self._kind_type) if self._of_modules else ()
-        wrong = list[PpafoError]()
+        wrong = Faults()
         for word, kind in named:
             if kind.name not in loaded:
-                with noted_in(wrong):
+                with wrong:
                     self._kinds[word] = self._checked(partial(object_of, word), f"{self.word} '{one_line(word)}'", "")
         for point in _entry_points(self.group, _installed_path()):
-            with noted_in(wrong):
+            with wrong:
                 if point.name in self._own:
                     name = f"{self.word} '{one_line(point.name)}' of {_package(point)}"
                     raise KindError(f"{name}: ppafo already has a kind with this name; rename the kind in its package")

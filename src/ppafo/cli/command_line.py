@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, NoReturn, cast, fi
 from ppafo.arguments.reading import Word, number, whole_number
 from ppafo.arguments.values import annotated_parameters
 from ppafo.cli import output
+from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import ArgumentError, PpafoError
 from ppafo.kinds import kind_at
 from ppafo.plugins import name_modules_in, name_plugins
@@ -28,10 +29,6 @@ from ppafo.wording import nearest_name, read_by
 
 if TYPE_CHECKING:
     from importlib.abc import InspectLoader
-
-    from _typeshed import SupportsWrite
-
-    from ppafo.documents.toml_text import TomlKind
 
 PROGRESS = "progress"
 """Parameter of a command function for the progress display, not set on the command line."""
@@ -51,14 +48,13 @@ _NAMING = ("overrides", "tasks", "metric", "metrics", "also", "such_that", "form
 class Command:
     """Command of the command line: function as ``module:function``, and properties beyond its signature.
 
-    ``library`` is the ``TomlKind`` of the bundled files (``module:NAME``), for ``--list``. ``listing`` is the function
-    (``module:function``) that returns the entries of that list, by default built from the files, and ``listed`` is the
-    noun for the entries. ``default_folder`` maps the parameters by name to the result folder used without ``--out``;
-    without it nothing is written by default.
+    ``listing`` is what ``--list`` prints: a function (``module:function``) that returns the entries, or the
+    ``TomlKind`` of bundled files (``module:NAME``). ``listed`` is the noun for the entries of a function.
+    ``default_folder`` maps the parameters by name to the result folder used without ``--out``; without it nothing is
+    written by default.
     """
 
     verb: str
-    library: str = ""
     listing: str = ""
     listed: str = ""
     default_folder: str = ""
@@ -83,11 +79,6 @@ class Command:
             said = inspect.getdoc(self.function()) or ""
         first_line = str(said).split("\n", 1)[0]
         return first_line[:1].lower() + first_line[1:].rstrip(".")
-
-    @property
-    def lists(self) -> bool:
-        """True if the command has ``--list``."""
-        return bool(self.library or self.listing)
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,8 +155,8 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
     is_alone = sum(not argument.option for argument in arguments) == 1
     for name, argument in zip(names, arguments, strict=True):
         help_text = helps.get(name, argument.word.help)
-        _add_argument(parser, argument, help_text, command.lists and is_alone, is_listing)
-    if command.lists:
+        _add_argument(parser, argument, help_text, bool(command.listing) and is_alone, is_listing)
+    if command.listing:
         parser.add_argument("--list", action="store_true", help="list what comes with the package")
     parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
     parser.add_argument(
@@ -247,28 +238,15 @@ def _add_argument(
 
 def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     """Call the function of a command with parsed arguments, deliver its result, and return the exit code."""
-    if command.lists and parsed.list:
-        library: TomlKind | None = kind_at(command.library) if command.library else None
-        noun = command.listed or (library.noun if library is not None else "")
-        if command.listing:
-            entries: output.CommandOutput | list[dict[str, Any]] = kind_at(command.listing)()
-            listing = entries if isinstance(entries, output.CommandOutput) else output.listing(noun, entries)
-        else:
-            assert library is not None
-            files = {name: library.parse(library.read(name), name) for name in library.names()}
-            rows = [
-                {"name": name} | {key: str(file[key]) for key in ("title", "description") if key in file}
-                for name, file in files.items()
-            ]
-            listing = output.listing(noun, rows, ("name", list(rows[0])[-1]))
-        return output.deliver(listing, parsed.json, None, "")
+    if command.listing and parsed.list:
+        return output.deliver(listing_of(command), parsed.json, None, "")
     verb = command.function()
     parameters = inspect.signature(verb).parameters
     values = {name: getattr(parsed, name) for name in parameters if name not in (PROGRESS, PLUGINS)}
     name_plugins(parsed.plugin)
     name_modules_in(str([values[parameter] for parameter in _NAMING if parameter in values]))
     for argument in arguments_of(verb):
-        if command.lists and values[argument.parameter.name] is None and argument.is_required:
+        if command.listing and values[argument.parameter.name] is None and argument.is_required:
             noun = argument.word.metavar.lower()
             raise UsageError(f"no {noun} was given; 'ppafo {name} --list' shows the available names")
     folder = None
@@ -282,6 +260,20 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     with output.progress_line() as progress, read_by("command line"):
         answer = verb(**values, **({PROGRESS: progress} if PROGRESS in parameters else {}))
     return output.deliver(answer, parsed.json, folder, name, has_written=OUT in parameters)
+
+
+def listing_of(command: Command) -> output.CommandOutput:
+    """Return the list of what comes with the package for a command."""
+    listed = kind_at(command.listing)
+    if isinstance(listed, TomlKind):
+        files = {name: listed.parse(listed.read(name), name) for name in listed.names()}
+        rows = [
+            {"name": name} | {key: str(file[key]) for key in ("title", "description") if key in file}
+            for name, file in files.items()
+        ]
+        return output.listing(listed.noun, rows, ("name", list(rows[0])[-1]))
+    entries = listed()
+    return entries if isinstance(entries, output.CommandOutput) else output.listing(command.listed, entries)
 
 
 _BAD_VALUE = re.compile(r"argument (?:--?\w+/)*(\S+): (?!invalid )(.+: .+)")
@@ -298,32 +290,16 @@ class UsageError(PpafoError):
 class CommandParser(argparse.ArgumentParser):
     """Argument parser that raises ``UsageError`` instead of printing its usage and ending the process."""
 
-    list_commands: Callable[[], str] | None = None
-    """Function that lists the commands at the end of the help; called only for help, as it loads every command."""
-
-    def format_help(self) -> str:
-        """Return the help, followed by the list of commands if there is one."""
-        if self.list_commands is not None:
-            self.description = f"{self.description}\n\n{self.list_commands()}"
-            self.list_commands = None
-        return super().format_help()
-
     def error(self, message: str) -> NoReturn:
         """Raise argparse's message as a one-line ``UsageError`` that names the help."""
         if (bad_value := _BAD_VALUE.fullmatch(message)) is not None:
             raise UsageError(f"{bad_value[1]} {bad_value[2]}")
         raise UsageError(f"{message.removeprefix('argument ')}; see '{self.prog} --help'")
 
-    def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
-        """Print a help text; unlike argparse, a failed write is an error."""
+    def _print_message(self, message: str, _file: object = None) -> None:
+        """Print the text of ``--help`` or ``--version``; unlike argparse, a failed write is an error."""
         with output.printing():
-            super()._print_message(message, file)
-
-    def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
-        """End the process after ``--help`` or ``--version`` with flushed output."""
-        with output.printing():
-            print(end="", flush=True)
-        super().exit(status, message)
+            print(message, end="", flush=True)
 
     def options(self) -> set[str]:
         """Return all options of the parser and its subcommands."""

@@ -14,7 +14,7 @@ _ANALYSES = "ppafo.analyses"
 _VERBS = "ppafo.cli.verbs"
 _SETS = f"{_VERBS}:sets_list"
 _GAITS = f"{_VERBS}:gait_list"
-_STUDIES = "ppafo.studies.loading:FILE", "ppafo.analyses.study_results:studies_of_the_package"
+_STUDIES = "ppafo.analyses.study_results:studies_of_the_package", "study"
 
 
 def _of_scenario(verb: str) -> Command:
@@ -26,8 +26,8 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
     "the paper": {
         "reproduce": Command(
             f"{_ANALYSES}.reproduce.question:reproduce",
-            library="ppafo.analyses.reproduce.claims:FILE",
             listing="ppafo.analyses.reproduce.claims:list_studies",
+            listed="publication",
         ),
     },
     "your device": {
@@ -56,10 +56,10 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
         "compare": _of_scenario(f"{_ANALYSES}.compare:compare"),
         "sensitivity": Command(f"{_ANALYSES}.sensitivity:sensitivity", *_STUDIES),
         "find": _of_scenario(f"{_ANALYSES}.find:find"),
-        "tune": Command(f"{_ANALYSES}.tune:tune", library="ppafo.analyses.tuning:TUNING"),
+        "tune": Command(f"{_ANALYSES}.tune:tune", listing="ppafo.analyses.tuning:TUNING"),
         "linearise": _of_scenario(f"{_ANALYSES}.linearise.question:linearise"),
-        "design": Command(f"{_ANALYSES}.design.question:design", library="ppafo.analyses.design.problem:FILE"),
-        "bottle": Command(f"{_ANALYSES}.endurance.question:bottle", library="ppafo.parameters.bottles.bottle:FILE"),
+        "design": Command(f"{_ANALYSES}.design.question:design", listing="ppafo.analyses.design.problem:FILE"),
+        "bottle": Command(f"{_ANALYSES}.endurance.question:bottle", listing="ppafo.parameters.bottles.bottle:FILE"),
     },
     "walk": {
         "gait": CommandGroup(
@@ -73,7 +73,7 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
         ),
         "walk": Command(
             f"{_ANALYSES}.walk.question:walk_with_and_without",
-            library="ppafo.walking.loading:FILE",
+            listing="ppafo.walking.loading:FILE",
             default_folder="ppafo.analyses.walk.question:default_folder",
         ),
     },
@@ -84,7 +84,7 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
                 "c": _of_scenario(f"{_VERBS}:export_c"),
                 "firmware": _of_scenario("ppafo.processor.commands:export_firmware"),
                 "fmu": _of_scenario(f"{_VERBS}:export_fmu"),
-                "opensim": Command("ppafo.cli.opensim:export_opensim", library="ppafo.walking.loading:FILE"),
+                "opensim": Command("ppafo.cli.opensim:export_opensim", listing="ppafo.walking.loading:FILE"),
                 "figure": Command("ppafo.cli.figure:export_figure"),
             },
         ),

@@ -7,7 +7,16 @@ from collections.abc import Sequence
 from functools import partial
 
 from ppafo import interrupts
-from ppafo.cli.command_line import Command, CommandGroup, CommandParser, UsageError, add_parameters, check_options, run
+from ppafo.cli.command_line import (
+    Command,
+    CommandGroup,
+    CommandParser,
+    UsageError,
+    add_parameters,
+    check_options,
+    listing_of,
+    run,
+)
 from ppafo.cli.commands import COMMANDS, OTHERS, check_words, list_commands
 from ppafo.cli.output import EXIT_INTERRUPTED
 from ppafo.errors import PpafoError
@@ -83,8 +92,8 @@ def _words(command: Command) -> list[str]:
     parser = CommandParser(add_help=True)
     add_parameters(parser, command)
     words = sorted(option for option in parser.options() if option.startswith("--"))
-    if command.library:
-        words += kind_at(command.library).names()
+    if command.listing:
+        words += [row["name"] for rows in listing_of(command).document.values() for row in rows]
     # Private, but argparse tells it nowhere else.
     for action in parser._actions:
         words += map(str, action.choices or ())
@@ -95,15 +104,19 @@ def _words(command: Command) -> list[str]:
 def build_parser(words: Sequence[str]) -> CommandParser:
     """Build the parser; only the module of the requested command is imported, for speed."""
     names = [word for word in words if not word.startswith("-")]
+    description = "Model-based design of pneumatic powered orthoses."
+    if not names and any(word.startswith(("-h", "--h")) for word in words):
+        # Only for the help, as the list loads the commands of other packages.
+        description = f"{description}\n\n{list_commands()}"
     parser = CommandParser(
         prog="ppafo",
         usage="ppafo [-h] [--version] COMMAND ...",
-        description="Model-based design of pneumatic powered orthoses.",
+        description=description,
         epilog="'ppafo COMMAND --help' shows what a command takes.\n"
         "'ppafo --completion bash' (or zsh) prints a script that completes commands, options and names.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.list_commands = list_commands
+
     parser.add_argument("--version", action="version", version=f"ppafo {__version__}")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", prog="ppafo", help=argparse.SUPPRESS)
     for name in dict.fromkeys((*COMMANDS, *OTHERS)):

@@ -6,7 +6,7 @@ from functools import lru_cache
 from typing import NoReturn
 
 from ppafo.documents.toml_text import KEY_LINE
-from ppafo.errors import PpafoError, raise_noted
+from ppafo.errors import Faults, PpafoError
 from ppafo.wording import said_missing
 
 _MAXIMUM_FAULTS = 5
@@ -27,7 +27,7 @@ def refuse(faults: Mapping[str, str], place: str, error: type[PpafoError], line:
     wrong = found[:_MAXIMUM_FAULTS]
     if len(found) > _MAXIMUM_FAULTS:
         wrong.append(error(f"{place}: and {len(found) - _MAXIMUM_FAULTS} more like these"))
-    raise_noted([*wrong, *([error(f"{place}: {said_missing(gaps)}")] if gaps else [])])
+    Faults([*wrong, *([error(f"{place}: {said_missing(gaps)}")] if gaps else [])]).raise_all()
     raise AssertionError("without a fault there is nothing to refuse")
 
 

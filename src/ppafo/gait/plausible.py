@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.errors import DataError, raise_noted
+from ppafo.errors import DataError, Faults
 from ppafo.gait.gait import HARMONICS, KNEE, REQUIRED, Gait, fit_curve
 from ppafo.signals.recording import Floats
 from ppafo.wording import without_exponent
@@ -101,7 +101,7 @@ class MeanStride:
 
 def check_plausible(walk: MeanStride) -> None:
     """Raise DataError for an implausible mean stride; the message names file, curve, number and limits."""
-    raise_noted([DataError(fault) for fault in _faults(walk)])
+    Faults([DataError(fault) for fault in _faults(walk)]).raise_all()
 
 
 def _faults(walk: MeanStride) -> Iterator[str]:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import get_args
 
-from ppafo.errors import IdentificationError, PpafoError, noted_in, raise_noted
+from ppafo.errors import Faults, IdentificationError
 from ppafo.identification.bench.flow import LARGEST_COEFFICIENT, FlowLaw, OpenValveFlowProblem
 from ppafo.identification.bench.free_decay import FreeDecayProblem
 from ppafo.identification.bench.law import BenchContext, BenchLaw, BenchResult
@@ -164,16 +164,16 @@ def read_tasks(
         window = -math.inf if first is None else first, math.inf if last is None else last
         sources: list[RecordingSource] = []
         for recording in procedure.recordings:
-            wrong = list[PpafoError]()
-            with noted_in(wrong):
+            wrong = Faults()
+            with wrong:
                 sources += reader.read(recording, procedure.columns, row_time, gas)
             if wrong and procedure.columns is not None:
                 # Missing channels of the map are said with what is wrong in it.
                 mapped = reader.columns[procedure.columns]
                 names = [name for name in mapped.channels if name != TIME]
-                with noted_in(wrong):
+                with wrong:
                     check_channels(recording, procedure, [*names, *(["direction"] if mapped.direction else [])])
-            raise_noted(wrong)
+            wrong.raise_all()
         tasks.append((procedure, tuple(sources), f"{reader.file}: procedure {number}, {kind}"))
         used += [
             UsedRecording(f"recording {at} of procedure {kind}", each.trace, each.recording, frozenset(), *window, kind)
@@ -189,16 +189,16 @@ def run_procedure(sources: tuple[RecordingSource, ...], problem: BenchProblem, c
 
     Raises IdentificationError, with the name of the recording or the label of the procedure first.
     """
-    wrong: list[PpafoError] = []
+    wrong = Faults()
     sources = tuple(replace(source, user=problem.kind) for source in sources)
     for source in sources:
-        with noted_in(wrong):
+        with wrong:
             check_channels(source.name, problem, source.recording.names)
     gas_used = ""
     if isinstance(problem, FlowLaw):
-        with noted_in(wrong):
+        with wrong:
             gas_used = problem.gas_used(problem.gas_of(sources, context))
-    raise_noted(wrong)
+    wrong.raise_all()
     try:
         result = problem.run(sources, context)
     except IdentificationError as error:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, decoded, read_regular_file
-from ppafo.errors import ParameterError, PpafoError, noted_in, raise_noted
+from ppafo.errors import Faults, ParameterError
 from ppafo.wording import finite_number, one_line, reason
 
 LONGEST = 40
@@ -34,15 +34,15 @@ def lines_of_table(path: Path, file: str, header: str) -> list[NumberedLine]:
 
 def numbers_of_table(rows: Sequence[NumberedLine], names: Sequence[str], file: str) -> list[list[float]]:
     """Return the numbers of all rows in the order of the columns ``names``. Raises ParameterError with all faults."""
-    wrong: list[PpafoError] = []
+    wrong = Faults()
     found = []
     for number, cells in rows:
         line = f"{file}, line {number}"
-        with noted_in(wrong):
+        with wrong:
             if len(cells) != len(names):
                 raise ParameterError(f"{line}: has {len(cells)} values, the header has {len(names)}")
             found.append([_number(cell, f"{line}: {name}") for name, cell in zip(names, cells, strict=True)])
-    raise_noted(wrong)
+    wrong.raise_all()
     if not found:
         raise ParameterError(f"{file}: has a header but no rows of numbers")
     return found

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.documents.toml_text import label
-from ppafo.errors import ParameterError, PpafoError, raise_noted
+from ppafo.errors import Faults, ParameterError
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION
 from ppafo.model.effects.opening import NODES
@@ -48,7 +48,7 @@ def entries_of_opening(table: Mapping[str, Any], folder: Path, where: str) -> di
         for place, command, opening in zip(places, *lists, strict=True)
         if (command, opening) not in ((0.0, 0.0), (1.0, 1.0))
     ]
-    wrong: list[PpafoError] = []
+    wrong = Faults()
     before = (0.0, 0.0)
     for place, command, opening in nodes:
         if not (before[0] < command < 1.0 and before[1] <= opening <= 1.0):
@@ -61,7 +61,7 @@ def entries_of_opening(table: Mapping[str, Any], folder: Path, where: str) -> di
         before = command, opening
     if not 0 < len(nodes) <= NODES:
         wrong.append(ParameterError(f"{where}: {len(nodes)} rows between (0, 0) and (1, 1); must be from 1 to {NODES}"))
-    raise_noted(wrong)
+    wrong.raise_all()
     known = {name: table[name] for name in ("origin", "source", "note") if name in table}
     return {
         f"{SECTION}.opening.{name}_{number:02}": Entry(value, "", **known)

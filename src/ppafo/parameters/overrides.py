@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from ppafo.arguments import Name, Overrides, checked
-from ppafo.errors import ParameterError, PpafoError, UnitError, noted_in, raise_noted, refused_as
+from ppafo.errors import Faults, ParameterError, PpafoError, UnitError, refused_as
 from ppafo.model.catalog import EFFECTS, find_effects
 from ppafo.model.effects.kind import SECTION
 from ppafo.model.gas import SPECIES
@@ -64,7 +64,7 @@ def read_overrides(texts: Iterable[str], error: type[PpafoError] = ParameterErro
     Raises ``error`` for all other texts, in sorted order.
     """
     in_order = tuple(texts)
-    wrong = []
+    wrong = Faults()
     read = {}
     for text in sorted(in_order):
         on_one_line = one_line(text)
@@ -75,7 +75,7 @@ def read_overrides(texts: Iterable[str], error: type[PpafoError] = ParameterErro
             wrong.append(
                 error(f"override '{on_one_line}' is not of the form PATH=VALUE, for example valve.area=12.6mm^2")
             )
-    raise_noted(wrong)
+    wrong.raise_all()
     return tuple(read[text] for text in in_order)
 
 
@@ -220,12 +220,12 @@ def with_overrides(parameter_set: ParameterSet, overrides: Iterable[Override], v
     # A gas brings numbers, and gauge pressures count from the atmosphere, so these two come first.
     first = [path for path in (SPECIES_PATH, ATMOSPHERE_PATH) if path in overrides_by_path]
     every = {**{path: overrides_by_path[path] for path in first}, **overrides_by_path, **followers}
-    wrong: list[PpafoError] = []
+    wrong = Faults()
     for path, text in every.items():
-        with noted_in(wrong):
+        with wrong:
             change = _with_text if path in (SPECIES_PATH, RELIEVING_PATH) else _with_number
             parameter_set = change(parameter_set, path, text)
-    raise_noted(wrong)
+    wrong.raise_all()
     # A user who gives a pressure in bar reads pressures in bar; a program gives numbers in SI, and reads none.
     typed = {
         path: parameter_set.numbers[path]

@@ -12,7 +12,7 @@ from typing import Any
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.kind import ControllerKind
-from ppafo.errors import ParameterError, PpafoError, ScenarioError, noted_in, raise_noted, refused_as
+from ppafo.errors import Faults, ParameterError, ScenarioError, refused_as
 from ppafo.model.catalog import VALVES
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
@@ -161,12 +161,12 @@ def build_scenario(reading: DocumentReader) -> Scenario:
     device = read_device(reading, origin, links)
     # Refusals are in the units of the set.
     with shown_in(device.shown):
-        wrong = list[PpafoError]()
-        with noted_in(wrong):
+        wrong = Faults()
+        with wrong:
             duration, step, output_interval, period = read_clock(reading)
-        with noted_in(wrong):
+        with wrong:
             of_sensors = reading.section("sensors", SENSORS)
-        with noted_in(wrong):
+        with wrong:
             controlled = controlled_in(document)
             if law.needs_reference and controlled not in law.controls:
                 able = ", ".join(name for name, other in CONTROLLERS.items() if controlled in other.controls)
@@ -177,9 +177,9 @@ def build_scenario(reading: DocumentReader) -> Scenario:
                 follows = f"follows a reference of {follows}, not {controlled}; {remedy}"
                 raise reading.refusal(path, f"the controller '{kind}' {follows}")
             reference, reference_links = _reference(reading, controlled, device.supply.atmospheric_pressure)
-        with noted_in(wrong):
+        with wrong:
             initial, initial_links = _initial(reading, device)
-        raise_noted(wrong)
+        wrong.raise_all()
         tolerance = reading.number("run.tolerance", ACCURACY)
         section = MOTIONS[kind_at(document, "motion")].section
         assert section is not None, "walks are built from another layout"

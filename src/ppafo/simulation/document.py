@@ -8,7 +8,7 @@ from typing import Any
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.faults import line_of
 from ppafo.documents.toml_text import quote
-from ppafo.errors import PpafoError, ScenarioError, UnitError, noted_in, raise_noted
+from ppafo.errors import Faults, PpafoError, ScenarioError, UnitError
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.parameters import ParameterSet
@@ -89,9 +89,9 @@ class DocumentReader:
     ) -> dict[str, float]:
         """Return all values of a section by name, in SI; gauge pressures refer to ``atmosphere`` [Pa absolute]."""
         values = {}
-        wrong = list[PpafoError]()
+        wrong = Faults()
         for quantity in quantities:
-            with noted_in(wrong):
+            with wrong:
                 values[quantity.name] = self.number(f"{section}.{quantity.name}", quantity, atmosphere)
-        raise_noted(wrong)
+        wrong.raise_all()
         return values

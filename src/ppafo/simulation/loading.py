@@ -10,7 +10,7 @@ from typing import Any
 from ppafo.documents.faults import line_of, refuse
 from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import KindError, ScenarioError, noted_in, raise_noted, refused_as
+from ppafo.errors import Faults, KindError, ScenarioError, refused_as
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.declared import KIND, Content, layout_of, value_at
 from ppafo.parameters.overrides import FORMS, Override, either, in_two_forms, read_overrides
@@ -143,13 +143,13 @@ def scenario_of(request: DocumentReader, layout: Layout) -> Scenario:
     # Faults of the file itself are said as such; an override may give a value that it lacks.
     _check_layout(request, content, may_have_gaps=bool(request.overrides))
     reading = override_document(request, content)
-    if wrong := list(reading.wrong):
+    if wrong := Faults(reading.wrong):
         # A kind that is not known has no values: where one is given, it is the mistake.
         _check_layout(reading, content, of_kinds_alone=True)
-        with noted_in(wrong):
+        with wrong:
             if value_at(reading.document, "device.set") is not None:
                 read_hardware(reading)
-        raise_noted(wrong)
+        wrong.raise_all()
     if request.overrides:
         _check_layout(reading, content)
     paths = [f"{section}.{name}" for section in FORMS for name in value_at(reading.document, section) or ()]

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from ppafo.errors import KindError, PpafoError, ScenarioError, noted_in, refused_as
+from ppafo.errors import Faults, KindError, ScenarioError, refused_as
 from ppafo.model.catalog import EFFECTS, VALVES
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION as EFFECTS_SECTION
@@ -51,7 +51,7 @@ def override_document(request: DocumentReader, content: Content = OF_A_VANE) -> 
     own = {path: override for path, override in override_at.items() if path not in of_device}
     remaining = _choose_kinds(changed, own, file, content)
     known = content.paths(changed) if own else ()
-    wrong: list[PpafoError] = []
+    wrong = Faults()
     for path in (path for path in own if path not in known):
         # A newly chosen kind may have made it unknown.
         deciding = deciding_kinds(path, filter(_is_kind_path, own))
@@ -64,7 +64,7 @@ def override_document(request: DocumentReader, content: Content = OF_A_VANE) -> 
             section, path_in_section = content.appended[path]
             changed.setdefault(section, {}).setdefault("overrides", []).append(f"{path_in_section}={own[path].text}")
         else:
-            with noted_in(wrong):
+            with wrong:
                 _set(changed, path, own[path].text, file, content)
     # What sections keep although another kind is chosen for them.
     old_kinds = {path: value_at(document, path) for path in filter(_is_kind_path, own)}

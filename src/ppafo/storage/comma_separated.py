@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted, refused_as
+from ppafo.errors import DataError, Faults, UnitError, refused_as
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.signals.recording import BETWEEN, PLAIN_NUMBER, TIME, TIME_UNIT, Between, Floats
 from ppafo.storage.files import read_bytes, text_of, write_file
@@ -244,13 +244,13 @@ def recording_of_columns(
     if not len(values[0]):
         raise DataError("has a header but no samples")
     channels = {}
-    faults = list[PpafoError]()
+    faults = Faults()
     for column, numbers in zip(columns, values, strict=True):
-        with noted_in(faults), refused_as(DataError, f"column '{column.name} [{column.unit}]'", UnitError):
+        with faults, refused_as(DataError, f"column '{column.name} [{column.unit}]'", UnitError):
             if column.si_unit == PLAIN_NUMBER and column.unit.removeprefix("m") in ("V", "A"):
                 raise UnitError(f"'{column.name}' is dimensionless; give factor in a column map")
             channels[column.name] = column.channel(numbers, atmosphere)
-    raise_noted(faults)
+    faults.raise_all()
     time = counted_on(channels.pop(TIME).values)
     check_clock(time, rows, noun)
     return Recording(label, time, channels, kind)

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.constants import MOLAR_MASSES, STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted, refused_as
+from ppafo.errors import DataError, Faults, UnitError, refused_as
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT, Floats
 from ppafo.storage.clock import clock_seconds, counted_on, is_clock
@@ -87,17 +87,17 @@ def read_mapped_text(content: bytes, columns: ColumnMap, map_name: str) -> Mappe
     lines = text_of(content, columns.encoding, remedy='; give encoding = "latin-1" for a Latin-1 file').splitlines()
     if any(map(_SERIAL_MONITOR.match, lines)):
         lines = _with_stamps_as_column(lines, columns)
-    faults = list[PpafoError]()
+    faults = Faults()
     indices = {}
     of_date = []
     with in_map(map_name):
         names, first_row, rows = _begun(lines, columns)
         titles = names or [str(number) for number in range(1, len(first_row) + 1)]
         for name, mapped in columns.channels.items():
-            with noted_in(faults):
+            with faults:
                 if mapped.column is not None:
                     indices[name] = _index_of(f"channels.{name}.column", mapped.column, names, titles)
-        raise_noted(faults)
+        faults.raise_all()
         if (date := columns.channels[TIME].date) is not None:
             of_date = [_index_of(f"channels.{TIME}.date", date, names, titles)]
     last_index = max((*indices.values(), *of_date), default=0)
@@ -281,15 +281,15 @@ def read_trials(
             else read_mapped_matlab(content, columns, map_name)
         )
         with in_map(map_name):
-            faults = list[PpafoError]()
+            faults = Faults()
             channels = {}
             for name, mapped in columns.channels.items():
-                with noted_in(faults):
+                with faults:
                     if name == TIME:
                         time = _time(mapped, table, atmosphere)
                     else:
                         channels[name] = _channel(name, mapped, table, atmosphere, gas)
-            raise_noted(faults)
+            faults.raise_all()
             falls = np.flatnonzero(np.diff(time) < 0.0) + 1
             if columns.trial is None and falls.size and np.all(time[falls] < np.mean(time[:2])):
                 line = f"{table.noun} {table.rows[falls[0]]}"

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
+from ppafo.errors import DataError, Faults
 from ppafo.signals.recording import TIME, Floats
 from ppafo.storage.column_map import ColumnMap, MappedTable, in_map, shown_names
 from ppafo.storage.files import read_bytes
@@ -229,13 +229,13 @@ def read_mapped_matlab(file: _MatlabFile, columns: ColumnMap, map_name: str) -> 
     Raises DataError with the key of a channel whose variable is absent or unusable, and with the map if it has a name.
     """
     with in_map(map_name):
-        faults = list[PpafoError]()
+        faults = Faults()
         named = {}
         for name, mapped in columns.channels.items():
-            with noted_in(faults):
+            with faults:
                 if mapped.column is not None:
                     named[name] = _variable(f"channels.{name}.column", mapped.column, file, is_text=name == TIME)
-        raise_noted(faults)
+        faults.raise_all()
         date = columns.channels[TIME].date
         clock = file.texts.get(named.get(TIME, ""))
         dates = (

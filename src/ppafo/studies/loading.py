@@ -13,13 +13,11 @@ from ppafo.arguments import Count, Overrides, Seed, checked
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import (
     DataError,
+    Faults,
     ParameterError,
-    PpafoError,
     ScenarioError,
     StudyError,
     UnitError,
-    noted_in,
-    raise_noted,
     refused_as,
 )
 from ppafo.loading import load_scenario, placed
@@ -212,13 +210,13 @@ def _load(
 
 def _build(parsed: StudyFile, document: dict[str, Any], source: _StudySource, changes: tuple[str, ...]) -> Study:
     """Build the study of a parsed study file in SI units; StudyError with all mistakes that stand in the file."""
-    wrong = list[PpafoError]()
+    wrong = Faults()
     configurations = []
     vary = parsed.vary
     sections = parsed.configurations
     paths = [entry["path"] for entry in parsed.vary]
     for section in sections:
-        with noted_in(wrong):
+        with wrong:
             configurations.append(_configuration(section, source.folder))
     unique = {
         "two configurations are named '{}'; give every configuration a different name": [
@@ -234,17 +232,17 @@ def _build(parsed: StudyFile, document: dict[str, Any], source: _StudySource, ch
         said = "'run.duration' cannot vary with trajectories or bands, which need runs of equal length"
         wrong.append(StudyError(said))
     # All else is about the scenarios.
-    raise_noted(wrong)
+    wrong.raise_all()
     scenarios = [configuration.scenario for configuration in configurations]
     varied = {}
     independent = []
     followed = {entry["path"]: entry[SAME_AS] for entry in vary if entry["kind"] == SAME_AS}
     for entry in vary:
-        with noted_in(wrong):
+        with wrong:
             varied[entry["path"]], values = _varied(entry, configurations, ATMOSPHERE_PATH in paths)
             independent += [] if values is None else [values]
         for section, configuration in zip(sections, configurations, strict=True):
-            with noted_in(wrong):
+            with wrong:
                 _check_not_set(entry, section, configuration)
     for path, other in followed.items():
         said = f"vary '{path}': same_as = '{other}'"
@@ -259,11 +257,11 @@ def _build(parsed: StudyFile, document: dict[str, Any], source: _StudySource, ch
             wrong.append(StudyError(both))
     uncertainty = Uncertainty(tuple(each for each in independent if isinstance(each, RandomValue)))
     random = [entry["path"] for entry in vary if entry["kind"] not in NOT_RANDOM]
-    with noted_in(wrong):
+    with wrong:
         uncertainty = replace(uncertainty, scores=_scores(parsed.correlations, random))
     outputs = parsed.outputs
     sample = parsed.sample
-    with noted_in(wrong):
+    with wrong:
         outputs = valid_outputs(outputs, scenarios)
     # A grid alone is run once, with the noise that its scenarios write.
     if uncertainty.drawn and not wrong:
@@ -274,7 +272,7 @@ def _build(parsed: StudyFile, document: dict[str, Any], source: _StudySource, ch
     # The direction numbers of SciPy's sequence end there.
     elif sample is not None and sample.method == "sobol" and len(drawn) > MAXIMUM_SOBOL_DIMENSIONS:
         wrong.append(StudyError(f"sample.method = 'sobol' allows at most {MAXIMUM_SOBOL_DIMENSIONS} distributions"))
-    raise_noted(wrong)
+    wrong.raise_all()
     # The noise, which has no [[vary]] table, is a plain number.
     units_of = {number.path: "-" for number in drawn} | {
         path: each.quantity.unit or "-" for path, each in varied.items()

@@ -18,7 +18,7 @@ from queue import SimpleQueue
 from secrets import token_hex
 from typing import Any, TypeVar
 
-from ppafo.errors import PpafoError, StudyError, noted_in, raise_noted, refused_as
+from ppafo.errors import Faults, PpafoError, StudyError, refused_as
 from ppafo.plugins import name_modules_in, object_of
 from ppafo.version import __version__
 from ppafo.wording import one_line
@@ -64,7 +64,7 @@ def computed_by(
     ended = SimpleQueue[Future[Any]]()
     lost = Counter[int]()
     waiting = {}
-    faults = list[PpafoError]()
+    faults = Faults()
     said = "executor: a class or function of the study cannot be sent to workers"
     with refused_as(StudyError, said, pickle.PicklingError, AttributeError, TypeError):
         sent = pickle.dumps(work)
@@ -76,7 +76,7 @@ def computed_by(
         # A mark for each submission: Dask merges equal calls, and would return the one that failed.
         mark = token_hex()
         # An executor of the user may raise anything.
-        with noted_in(faults), refused_as(StudyError, "executor: takes no more work, give a new one", Exception):
+        with faults, refused_as(StudyError, "executor: takes no more work, give a new one", Exception):
             future = executor.submit(_computed, sent, blocks[number], __version__, mark)
             future.add_done_callback(ended.put)
             waiting[future] = number, mark
@@ -106,7 +106,7 @@ def computed_by(
                     said = f"executor: block {number} was lost {_TRIALS} times: {type(error).__name__}"
                     raise StudyError(f"{said}: {one_line(error)}") from error
                 submit(number)
-        raise_noted(faults[:1])
+        Faults(faults[:1]).raise_all()
     finally:
         for future in waiting:
             future.cancel()

@@ -18,13 +18,12 @@ from ppafo.control.profiles import KNOTS
 from ppafo.documents.toml_text import TomlKind, beside, label
 from ppafo.errors import (
     DataError,
+    Faults,
     ParameterError,
     PpafoError,
     StudyError,
     UnitError,
     at_fault,
-    noted_in,
-    raise_noted,
     refused_as,
 )
 from ppafo.gait import load_gait
@@ -242,20 +241,20 @@ def load_design(problem: str | Path, *, profile: str | Path | None = None, plugi
     with at_fault("problem"):
         content = FILE.read(problem)
     document = checked_record(SizingFile, FILE.parse(content, file), file, StudyError, content)
-    wrong = list[PpafoError]()
+    wrong = Faults()
     valves = {}
     bottles = []
     atmosphere = STANDARD_ATMOSPHERE
     largest = 1.0
     pressures = []
-    with noted_in(wrong):
+    with wrong:
         if profile:
             with at_fault("profile"):
                 required = read_profile(ProfileSection(recording=str(profile)), Path(), f"{file}: profile")
         else:
             required = read_profile(document.profile, folder, f"{file}: profile")
         largest = required.largest
-    with noted_in(wrong):
+    with wrong:
         plain = load_scenario(beside(document.scenario, folder), document.overrides)
         atmosphere = plain.device.supply.atmospheric_pressure
         plain.device.check_torque_constant("the size of a device", _FOR_A_CYLINDER)
@@ -265,18 +264,18 @@ def load_design(problem: str | Path, *, profile: str | Path | None = None, plugi
                 f"'{plain.controller.kind}'); choose a scenario with a reference"
             )
         for name, values in document.valves.items():
-            with noted_in(wrong), refused_as(StudyError, f"{file}: valves.{name}", PpafoError):
+            with wrong, refused_as(StudyError, f"{file}: valves.{name}", PpafoError):
                 valve = reloaded(plain, [f"valve.{key}={value}" for key, value in values.items()]).device.valve
                 numbers = {**asdict(valve.orifice), **valve.settings}
                 valves[name] = {f"valve.{key}": value for key, value in numbers.items()}
         for name in dict.fromkeys(document.bottles):
-            with noted_in(wrong), refused_as(StudyError, f"{file}: bottles", ParameterError):
+            with wrong, refused_as(StudyError, f"{file}: bottles", ParameterError):
                 bottle = load_bottle(beside(name, folder))
                 if not is_of_bottle(plain.device.gas.molar_mass, bottle):
                     gas = f"contains {bottle.fluid.name}, but the device uses {plain.device.gas.species}"
                     raise ParameterError(f"'{name}' {gas}: choose another, or set gas.species in overrides")
                 bottles.append(bottle)
-    with noted_in(wrong):
+    with wrong:
         for key, text in asdict(document.pressure).items():
             with refused_as(StudyError, f"{file}: pressure.{key} = '{text}'", UnitError):
                 pressures.append(parse_quantity(text, "Pa_a", atmosphere))
@@ -289,12 +288,12 @@ def load_design(problem: str | Path, *, profile: str | Path | None = None, plugi
     limit = document.limits.rms_error
     if (use.repetitions is None) == (use.hours is None):
         wrong.append(StudyError(f"{file}: [use]: give either repetitions or hours"))
-    with noted_in(wrong), refused_as(StudyError, f"{file}: limits.rms_error = '{limit}'", UnitError):
+    with wrong, refused_as(StudyError, f"{file}: limits.rms_error = '{limit}'", UnitError):
         relative = split_quantity(limit)[1] in ("%", "percent")
         largest_error = parse_quantity(limit, "") * largest if relative else parse_quantity(limit, _TORQUE)
         if largest_error <= 0.0:
             raise UnitError("must be above 0; write '0.5 N m' or '5 %'")
-    raise_noted(wrong)
+    wrong.raise_all()
     # A multiple of both intervals: the run then ends with a sample of the controller and of the output.
     a, b, duration = (
         Fraction(interval).limit_denominator(_LARGEST_DENOMINATOR)

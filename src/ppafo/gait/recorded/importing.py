@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.arguments import checked
-from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
+from ppafo.errors import DataError, Faults, PpafoError
 from ppafo.gait.document import load_gait
 from ppafo.gait.gait import HARMONICS, REQUIRED, FitError, Gait, GaitCurve, Origin, fit_curve
 from ppafo.gait.plausible import (
@@ -174,14 +174,14 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     DataError that lists all problems with file, column, row and remedy: after a problem with one curve, the other
     curves are still checked. Repaired values are listed in the remarks.
     """
-    wrong: list[PpafoError] = []
-    with noted_in(wrong):
+    wrong = Faults()
+    with wrong:
         check_settings(settings)
     source = read_source(files, settings, wrong)
     try:
         footfalls = find_footfalls(source.walk, source.tables, settings.side, settings.least_strides)
     except PpafoError as error:
-        raise_noted([*wrong, error])
+        Faults([*wrong, error]).raise_all()
     curves, strides, unmeasured = _curves_over_strides(source, footfalls, wrong)
     # Both coordinates of the knee may be from one marker, whose scale is one.
     labels = [name.rpartition(".")[0] for name in unsigned_names(source.columns.knee)]
@@ -196,7 +196,7 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     most = f"at most {100.0 * REFUSED_SPREAD:.0f} % and {100.0 * REFUSED_MISFIT:.0f} % are accepted"
     scattered = _scatters(curves, REFUSED_SPREAD, REFUSED_MISFIT)
     wrong += [DataError(f"{walk[name].file}: {message}; {most}") for name, message in scattered]
-    with noted_in(wrong):
+    with wrong:
         # The ankle of the other foot looks like a wrong zero to the checks of the curves.
         check_side(mean_stride, load_gait())
         check_plausible(mean_stride)
@@ -206,7 +206,7 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
         if speed < -_FASTEST_BACK:
             against = f"the knee moves backwards at {-speed:.2g} m/s, so knee.forward points against the"
             wrong.append(DataError(f"{way.file}: {against} walking direction"))
-    raise_noted(wrong)
+    wrong.raise_all()
     less = ": heel strikes and toe-offs are from shank_angle and less exact" if footfalls.events == SHANK else ""
     foot = source.columns.ankle_angle
     count = len(strides.taken)
@@ -258,7 +258,7 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
 
 
 def _curves_over_strides(
-    source: GaitSource, footfalls: Footfalls, wrong: list[PpafoError]
+    source: GaitSource, footfalls: Footfalls, wrong: Faults
 ) -> tuple[dict[str, CurveStatistics], StrideSelection, list[str]]:
     """Return the curves over the selected strides, the selection, and a remark on each load without a measured stance.
 
@@ -281,7 +281,7 @@ def _curves_over_strides(
     if len(kept) < least:
         wrong.append(DataError(_too_few(usable, footfalls)))
     if not kept:
-        raise_noted(wrong)
+        wrong.raise_all()
     covered = {name: [stride for stride in usable.taken if covers(footfalls, name, stride)] for name in recorded}
     # A load that no plate measured for a whole stance would otherwise be refused as one whose file is too short.
     uncovered = [name for name in LOADS if name in recorded and not covered[name]]
@@ -311,7 +311,7 @@ def _curves_over_strides(
             )
         )
     if any(name not in remaining for name in REQUIRED):
-        raise_noted(wrong)
+        wrong.raise_all()
     remarks = [f"{name} is left out: not measured throughout the stance of any stride" for name in unmeasured]
     return remaining, strides, remarks
 
@@ -341,7 +341,7 @@ def without_drop_outs(
     tables: Sequence[MotionTable],
     covered: Mapping[str, Sequence[Stride]],
     strides: StrideSelection,
-    wrong: list[PpafoError],
+    wrong: Faults,
 ) -> StrideSelection:
     """Reject strides in which a column is constant for more than 0.1 s; in swing, a load may be constant.
 
@@ -364,7 +364,7 @@ def without_drop_outs(
         for column, values in columns:
             for start, end in constant_stretches(table.time, values, spans):
                 what = f"column {column!r} of {name} is constant from {start:.4g} to {end:.4g} s"
-                with noted_in(wrong):
+                with wrong:
                     strides = strides.without(
                         [stride for stride in strides.taken if stride.start < end and start < stride.end],
                         f"{what}: a sensor drop-out",

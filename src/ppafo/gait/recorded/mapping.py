@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Annotated, Literal, cast, get_args
 
 from ppafo.documents.toml_text import NAME, TomlKind
-from ppafo.errors import ArgumentError, DataError, UnitError, raise_noted, refused_as
+from ppafo.errors import ArgumentError, DataError, Faults, UnitError, refused_as
 from ppafo.gait.gait import BODY_MASSES, SPEEDS, STATURES
 from ppafo.gait.recorded.table import LONGEST_FILLED
 from ppafo.parameters.declared import Many, Words
@@ -231,7 +231,7 @@ def load_map(path: str | Path) -> GaitMap:
         wrong.append("knee: thigh_length and thigh_unit are given without thigh; omit them or give thigh")
     if not loaded.named and loaded.time is None:
         wrong.append("the gait map has no curve, such as [ankle_angle]")
-    raise_noted([DataError(f"{file}: {fault}") for fault in wrong])
+    Faults([DataError(f"{file}: {fault}") for fault in wrong]).raise_all()
     return loaded
 
 
@@ -326,4 +326,4 @@ def check_settings(settings: ImportSettings) -> None:
         wrong.append(f"name {settings.name!r} must consist of lower-case letters, digits, '-' and '_'")
     if settings.least_strides is not None and settings.least_strides < 1:
         wrong.append(f"the minimum number of strides must be 1 or more, not {settings.least_strides}")
-    raise_noted([DataError(text) for text in wrong])
+    Faults([DataError(text) for text in wrong]).raise_all()

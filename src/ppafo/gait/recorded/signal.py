@@ -9,7 +9,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted, refused_as
+from ppafo.errors import DataError, Faults, UnitError, refused_as
 from ppafo.gait.gait import HARMONICS
 from ppafo.gait.recorded.mapping import KneeMap, column_names, setting_text, unsigned_names
 from ppafo.gait.recorded.table import COORDINATES, MotionTable, marker_of
@@ -114,10 +114,10 @@ class CurveColumns:
         """Return the sum of the terms in the first SI unit that fits, and this unit; raises DataError if none fits."""
         total = np.zeros(self.table.time.size)
         chosen = si_units[0]
-        wrong: list[PpafoError] = []
+        wrong = Faults()
         for sign, name in self.terms:
             if self.unit_key.partition(".")[0] not in LOADS:
-                with noted_in(wrong):
+                with wrong:
                     check_recorded(self.table.columns[name], f"{self.table.file}: column {name!r}")
             where = f"{self.table.file}: column {name!r}"
             unit = stated or self.table.units[name]
@@ -137,7 +137,7 @@ class CurveColumns:
                 problem = ""
                 break
             wrong += [DataError(f"{where}{problem}")] if problem else []
-        raise_noted(wrong)
+        wrong.raise_all()
         return total, chosen
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
+from ppafo.errors import DataError, Faults
 from ppafo.gait.gait import REQUIRED
 from ppafo.gait.plausible import SHANK_RANGE, MeanStride, ankle_faults_alone, check_force_scale, moment_faults
 from ppafo.gait.recorded.footfalls import FORCE, force_of_plates
@@ -111,7 +111,7 @@ def walk_signals(
     body_mass: float,
     stature: float | None,
     required: Set[str],
-    wrong: list[PpafoError],
+    wrong: Faults,
 ) -> dict[str, Signal]:
     """Return the signals of a recorded walk by curve; problems with their columns are added to ``wrong``.
 
@@ -123,15 +123,15 @@ def walk_signals(
     """
     angles = {name: unsigned_names(getattr(columns, name)) for name in REQUIRED}
     if not any(table.columns.keys() >= set(names) for table in tables for names in angles.values()):
-        with noted_in(wrong):
+        with wrong:
             refuse_missing(angles, tables)
-        raise_noted(wrong)
+        wrong.raise_all()
     walk: dict[str, Signal] = {}
     # The shank stands first: an ankle from markers of the foot turns against it.
     for name in _UNITS:
         mapped = getattr(columns, name)
         found = None
-        with noted_in(wrong):
+        with wrong:
             found = find_columns(name, mapped, tables, name not in {*required, *REQUIRED})
             if found is None:
                 continue
@@ -146,7 +146,7 @@ def walk_signals(
         if isinstance(mapped, ShankMap) and found is not None and name in walk:
             # In a recording that is no walk, other faults do not matter.
             check_walks(walk[name], found, mapped)
-    with noted_in(wrong):
+    with wrong:
         knee = knee_signals(columns.knee, tables, stature, "knee" not in required)
         walk |= {name: without_ends(signal) for name, signal in knee.items()}
     return walk
@@ -338,7 +338,7 @@ class GaitSource:
     remarks: tuple[str, ...]
 
 
-def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: list[PpafoError]) -> GaitSource:
+def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: Faults) -> GaitSource:
     """Return the signals in recorded files; problems that leave both angles usable are added to ``wrong``.
 
     Raises DataError for a problem that ends the import, including all problems in ``wrong``.
@@ -355,7 +355,7 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
     try:
         convention = _completed_map(own, tables, settings.side, body_mass)
     except DataError as error:
-        raise_noted([*wrong, error])
+        Faults([*wrong, error]).raise_all()
     columns = convention.columns
     if settings.ankle_neutral is not None:
         neutral = format_quantity(settings.ankle_neutral, "rad")
@@ -371,20 +371,20 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
         curves = {name: signal.values[np.isfinite(signal.values)] for name, signal in walk.items()}
         whole = MeanStride({name: signal.file for name, signal in walk.items()}, curves, 0.0, 0.0)
         faults = [*ankle_faults_alone(whole), *(moment_faults(whole) if settings.body_mass else ())]
-        raise_noted([*wrong, *map(DataError, faults)])
+        Faults([*wrong, *map(DataError, faults)]).raise_all()
     # The knee is one entry of a map, but two curves.
     added = {name: each.columns for name, each in walk.items() if not {name, name.partition("_")[0]} & {*named}}
     if own is not None and added:
         shown = "; ".join(f"{name} from {', '.join(map(repr, names))}" for name, names in added.items())
         remarks.append(f"not in the gait map, read as the {settings.side} foot by the file format: {shown}")
     if not is_usable:
-        raise_noted(wrong)
+        wrong.raise_all()
     # Loads of unknown body mass, and a force of a wrong scale, get a largest value of 1: their events are still found.
     if settings.body_mass is None:
         walk |= {name: of_largest_one(walk[name]) for name in ("ankle_moment", FORCE) if name in walk}
     elif convention.plates and FORCE not in walk:
         # Without a force in the files, the plates that this foot steps on give it.
-        with noted_in(wrong):
+        with wrong:
             force, on_plates = force_of_plates(tables, convention.plates, walk["shank_angle"], body_mass)
             walk |= {} if force is None else {FORCE: force}
             remarks += on_plates
@@ -400,7 +400,7 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
 
 
 def _read_tables(
-    files: Sequence[str | Path], settings: ImportSettings, own: Set[str], wrong: list[PpafoError]
+    files: Sequence[str | Path], settings: ImportSettings, own: Set[str], wrong: Faults
 ) -> list[MotionTable]:
     """Return the tables of files as their formats arrange them, with the columns ``own`` as the files have them.
 
@@ -412,10 +412,10 @@ def _read_tables(
     start, end = (None, None) if wrong else (settings.start, settings.end)
     read: list[MotionTable] = []
     for path in files:
-        with noted_in(wrong):
+        with wrong:
             read.append(read_table(path, settings.longest_gap, start, end, settings.form))
     if len(read) < len(files):
-        raise_noted(wrong)
+        wrong.raise_all()
     if settings.stride_time is not None:
         read = [mean_stride_table(each, settings.stride_time) if each.problem else each for each in read]
         if not any(each.is_mean_stride or each.problem for each in read):
@@ -447,7 +447,7 @@ def of_largest_one(signal: Signal, is_upwards: bool = False) -> Signal:
 
 
 def _with_subject(
-    settings: ImportSettings, tables: Sequence[MotionTable], wrong: list[PpafoError]
+    settings: ImportSettings, tables: Sequence[MotionTable], wrong: Faults
 ) -> tuple[ImportSettings, list[str]]:
     """Return the settings, completed with body mass and stature from C3D files; values of the user take precedence.
 

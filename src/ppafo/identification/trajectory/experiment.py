@@ -9,7 +9,7 @@ from typing import get_args
 
 import numpy as np
 
-from ppafo.errors import IdentificationError, PpafoError, ScenarioError, UnitError, noted_in, raise_noted, refused_as
+from ppafo.errors import Faults, IdentificationError, ScenarioError, UnitError, refused_as
 from ppafo.identification.bench.law import BenchContext
 from ppafo.identification.estimate import Estimate, interval_factor
 from ppafo.identification.fit import FitNumber, tolerance
@@ -400,16 +400,16 @@ class TrajectoryProblem:
         if message := double_use((*self.used, *(experiment.use for experiment in self.experiments))):
             raise IdentificationError(message)
         numbers = []
-        wrong = list[PpafoError]()
+        wrong = Faults()
         for parameter in self.parameters:
             for label in (label for label in parameter.recordings if label not in labels):
                 near = known_names(label, labels)
                 raise IdentificationError(f"{parameter.path}: there is no experiment '{label}'{near}")
-            with noted_in(wrong):
+            with wrong:
                 numbers.append(
                     number_of(parameter, [item for item in self.experiments if parameter.acts_in(item.label)])
                 )
-        raise_noted(wrong)
+        wrong.raise_all()
         for kind, names in (("experiment", labels), ("parameter", [number.name for number in numbers])):
             if (twice := first_twice(names)) is not None:
                 raise IdentificationError(f"{kind} '{twice}' is given twice")

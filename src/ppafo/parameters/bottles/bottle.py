@@ -11,7 +11,7 @@ from typing import Any
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.documents.toml_text import NAME, TomlKind, label
-from ppafo.errors import ParameterError, PpafoError, UnitError, noted_in, raise_noted, refused_as
+from ppafo.errors import Faults, ParameterError, UnitError, refused_as
 from ppafo.model.cold_gas import ColdSupply, Passage
 from ppafo.model.declaration import Quantity
 from ppafo.model.gas import SPECIES
@@ -268,15 +268,15 @@ def _build(parsed: Mapping[str, Any], entries: Mapping[str, Entry], file: str) -
     with refused_as(ParameterError, f"{file}: gas = '{parsed['gas']['value']}'", ParameterError):
         fluid = load_fluid(parsed["gas"]["value"])
     values: dict[str, float] = {}
-    wrong: list[PpafoError] = []
+    wrong = Faults()
     for path, entry in entries.items():
-        with noted_in(wrong):
+        with wrong:
             assignment = f"{file}: {path} = {format_quantity(entry.value, entry.unit)}"
             values[path] = allowed_number(assignment, entry, PATHS[path])
     missing = [path for path in REQUIRED if path not in entries]
     if missing:
         wrong.append(ParameterError(f"{file}: {said_missing(missing)}"))
-    raise_noted(wrong)
+    wrong.raise_all()
     bottle = Bottle(
         name=parsed["name"],
         title=parsed["title"],

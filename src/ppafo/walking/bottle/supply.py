@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.constants import GRAMS_PER_KILOGRAM, UNIVERSAL_GAS_CONSTANT
-from ppafo.errors import ParameterError, PpafoError, ScenarioError, raise_noted, refused_as
+from ppafo.errors import Faults, ParameterError, ScenarioError, refused_as
 from ppafo.model.cold_gas import Isobar, SupplyNow, SupplyState, following_rates, isobar, supply_now
 from ppafo.model.declaration import Quantity
 from ppafo.model.gas import specific_gas_constant
@@ -160,7 +160,7 @@ def read_bottle(reading: DocumentReader, device: Device) -> BottleSupply | None:
     room = device.supply.atmospheric_pressure
     # Gauge is the same at both: a bottle's file knows no atmosphere, and stands in that of the device.
     own_pressure = to_si(bottle.entries[SET_PRESSURE].value, bottle.entries[SET_PRESSURE].unit, "Pa_a", room)
-    wrong: list[PpafoError] = []
+    wrong = Faults()
     if not is_of_bottle(device.gas.molar_mass, bottle):
         species = bottle.fluid.name
         fed = device.gas.species
@@ -172,7 +172,7 @@ def read_bottle(reading: DocumentReader, device: Device) -> BottleSupply | None:
         problem = f"{name} sets {SET_PRESSURE} to {own_text}, but supply.pressure is"
         problem += f" {shown_text(pressure, 'Pa_a', atmosphere=room)}: set supply.pressure={own_text}"
         wrong.append(ScenarioError(f"{reading.file}: {BOTTLE_NAME}: {problem}"))
-    raise_noted(wrong)
+    wrong.raise_all()
     # The bottle with its regulator set to the supply pressure of the device, in its entries too.
     entry = Entry(value=pressure, unit="Pa_a", origin="derived", source="supply.pressure of the walk")
     regulator = bottle.regulator._replace(set_pressure=pressure)
