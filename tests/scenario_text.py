@@ -11,5 +11,6 @@ from ppafo.simulation.scenario import Scenario
 
 def parse_scenario(content: bytes, file: str, overrides: Iterable[str] = ()) -> Scenario:
     """Return the scenario in the bytes of a TOML file; ScenarioError or ParameterError for what cannot be used."""
-    document, given = FILE.parse(content, file), read_overrides(overrides, ScenarioError)
+    document = FILE.parse(content, file).document
+    given = read_overrides(overrides, ScenarioError)
     return scenario_of(DocumentReader(file, document, path=file, overrides=given), VANE)

@@ -323,11 +323,11 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
     Tuning 'pid-gains' of 'torque-task-proportional': controller.proportional_gain, controller.integral_gain,
     controller.derivative_gain
     """
-    document, source = ask.read_source(TUNING, tuning)
-    parsed = checked_record(TuningFile, document, source.file, StudyError, source.text)
+    source = ask.read_source(TUNING, tuning)
+    parsed = checked_record(TuningFile, source)
     robust = parsed.robust
     paths = [gain.path for gain in parsed.search]
-    with refused_as(StudyError, source.file, ScenarioError, ParameterError, StudyError):
+    with refused_as(StudyError, source.label, ScenarioError, ParameterError, StudyError):
         scenario = ask.load_scenario(ask.placed(parsed.scenario, source.folder), parsed.overrides)
         scenario = ask.reloaded(scenario, overrides) if overrides else scenario
         metrics = [*(goal.metric for goal in parsed.objective), *(limit.metric for limit in parsed.constraints)]

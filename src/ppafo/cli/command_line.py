@@ -266,7 +266,7 @@ def listing_of(command: Command) -> output.CommandOutput:
     """Return the list of what comes with the package for a command."""
     listed = kind_at(command.listing)
     if isinstance(listed, TomlKind):
-        files = {name: listed.parse(listed.read(name), name) for name in listed.names()}
+        files = {name: listed.load(name).document for name in listed.names()}
         rows = [
             {"name": name} | {key: str(file[key]) for key in ("title", "description") if key in file}
             for name, file in files.items()

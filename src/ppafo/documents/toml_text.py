@@ -52,6 +52,20 @@ def beside(name: str, folder: Path, known: Collection[str] = ()) -> str:
 
 
 @dataclass(frozen=True, slots=True)
+class TomlFile:
+    """Document of a TOML file, not yet checked, with what messages need: label of the file, error type, bytes.
+
+    ``folder`` is the one of its relative paths. ``content`` is empty for plain data that were in no file.
+    """
+
+    label: str
+    document: dict[str, Any]
+    error: type[PpafoError]
+    content: bytes = b""
+    folder: Path = Path()
+
+
+@dataclass(frozen=True, slots=True)
 class TomlKind:
     """Kind of TOML file: noun for messages, name for ``--schema``, folder of bundled files, and error type."""
 
@@ -81,8 +95,12 @@ class TomlKind:
         except (OSError, ValueError) as error:
             raise self.error(f"{label(name)}: cannot be read: {reason(error)}") from error
 
-    def parse(self, content: bytes, file: str) -> dict[str, Any]:
-        """Parse the bytes of a file; ``file`` is its label in messages."""
+    def load(self, name_or_path: str | Path) -> TomlFile:
+        """Read and parse a bundled file by name, or any other file by path."""
+        return self.parse(self.read(name_or_path), label(str(name_or_path)), Path(name_or_path).parent)
+
+    def parse(self, content: bytes, file: str, folder: Path = Path()) -> TomlFile:
+        """Parse the bytes of a file; ``file`` is its label in messages, ``folder`` that of its relative paths."""
         try:
             text = decoded(content)
         except UnicodeDecodeError as error:
@@ -104,7 +122,7 @@ class TomlKind:
         for other, keys in _SIGNS.items():
             if self.noun not in (other, "scenario", "walk") and keys <= document.keys():
                 raise self.error(f"{file}: is a {other}, not a {self.noun}")
-        return document
+        return TomlFile(file, document, self.error, content, folder)
 
     def check_depth(self, document: Mapping[str, Any], file: str) -> None:
         """Raise an error for tables nested too deeply; ``file`` is the label in messages."""

@@ -104,8 +104,9 @@ def declared(_document: Mapping[str, Any]) -> dict[str, Field]:
 def parse_gait(content: bytes, file: str) -> Gait:
     """Return the gait in the content of a gait file; ``file`` names it in messages. Raises DataError if invalid."""
     place = label(file)
-    document = _FILE.parse(content, place)
-    check_keys(document, declared(document), place, DataError, content)
+    parsed = _FILE.parse(content, place)
+    document = parsed.document
+    check_keys(parsed, declared(document))
     numbers = {
         name: quantity.default if (value := value_at(document, path)) is None else number_in(value, quantity)
         for path, (name, quantity) in _NUMBERS.items()

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from ppafo.documents.faults import line_of, refuse
 from ppafo.documents.regular_file import decoded
-from ppafo.documents.toml_text import TomlKind, label, quote
+from ppafo.documents.toml_text import TomlKind, quote
 from ppafo.errors import IdentificationError
 from ppafo.identification.procedures import BenchProblem
 from ppafo.identification.tolerances import Columns, Confidence, Tolerances
@@ -161,10 +161,10 @@ def load_problem(path: str | Path) -> ProblemFile:
 
     Raises IdentificationError for an invalid file, and for recordings that are not there.
     """
-    file = label(str(path))
-    content = _FILE.read(path)
-    folder = Path(path).parent
-    problem = checked_record(ProblemFile, _FILE.parse(content, file), file, IdentificationError, content)
+    source = _FILE.load(path)
+    file = source.label
+    folder = source.folder
+    problem = checked_record(ProblemFile, source)
     # Each may be left out, which the layout allows, but not both.
     if not problem.procedure and problem.trajectory is None:
         raise IdentificationError(f"{file}: has neither a [[procedure]] nor a [trajectory]")
@@ -187,7 +187,7 @@ def load_problem(path: str | Path) -> ProblemFile:
             near = nearest_name(name, [each.name for each in folder.iterdir()])
             faults[key] = f"{key} = {quote(name)}: {wrong}{near}"
     if faults:
-        refuse(faults, file, IdentificationError, partial(line_of, decoded(content)))
+        refuse(faults, file, IdentificationError, partial(line_of, decoded(source.content)))
     return problem
 
 

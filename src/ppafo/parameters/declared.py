@@ -15,8 +15,8 @@ from typing import Any
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.faults import line_of, refuse
 from ppafo.documents.regular_file import decoded
-from ppafo.documents.toml_text import NAME, NAME_RULE, SCHEMA, quote
-from ppafo.errors import KindError, PpafoError, UnitError
+from ppafo.documents.toml_text import NAME, NAME_RULE, SCHEMA, TomlFile, quote
+from ppafo.errors import KindError, UnitError
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import is_within, range_rule
 from ppafo.plugins import nearest_kind
@@ -341,12 +341,10 @@ def layout_of(fields: Fields, reads_numbers: bool = True) -> FieldLayout:
     return FieldLayout(fields, names, reads_numbers)
 
 
-def check_keys(
-    document: Mapping[str, Any], fields: Fields, place: str, error: type[PpafoError], content: bytes
-) -> None:
-    """Raise ``error`` with what is wrong in a document, by line of its ``content``; messages start with ``place``."""
-    if faults := dict(layout_of(fields).faults(document)):
-        refuse(faults, place, error, lambda path: line_of(decoded(content), path))
+def check_keys(source: TomlFile, fields: Fields) -> None:
+    """Raise the error of a file with what is wrong in its document, by line of the file."""
+    if faults := dict(layout_of(fields).faults(source.document)):
+        refuse(faults, source.label, source.error, lambda path: line_of(decoded(source.content), path))
 
 
 def schema_of(title: str, *declares: Declare) -> dict[str, Any]:

@@ -110,9 +110,7 @@ def load_parameter_set(parameter_set: str | Path, *, plugins: Plugins = ()) -> P
     >>> ppafo.load_parameter_set("ppafo2011").title
     'Portable powered ankle-foot orthosis, completed'
     """
-    content = FILE.read(parameter_set)
-    file = label(str(parameter_set))
-    return parse_parameter_set(content, file, Path(parameter_set).parent)
+    return parse_parameter_set(FILE.read(parameter_set), label(str(parameter_set)), Path(parameter_set).parent)
 
 
 def set_or_load(parameter_set: ParameterSet | str | Path | None) -> ParameterSet | None:
@@ -127,14 +125,15 @@ def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -
 
     The file of a measured actuator is searched relative to ``folder``. Raises ParameterError if the set is not usable.
     """
-    document = FILE.parse(content, file)
+    source = FILE.parse(content, file)
+    document = source.document
     with refused_as(ParameterError, file, KindError):
         fields = declared(document)
     if next(layout_of(fields).faults(document), None):
         # So that the messages know every kind of this package.
         for catalogue in (VALVES, ACTUATORS, EFFECTS):
             catalogue.load_own()
-        check_keys(document, declared(document), file, ParameterError, content)
+        check_keys(source, declared(document))
     parameter_set = _parameter_set(document, fields, file, folder or Path())
     # Refuses a default valve that the set does not have.
     chosen_valve(parameter_set, None)

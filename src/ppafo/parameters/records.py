@@ -11,11 +11,9 @@ import typing
 from collections.abc import Mapping
 from dataclasses import MISSING, field, fields, is_dataclass, replace
 from functools import cache, partial
-from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
-from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import PpafoError
+from ppafo.documents.toml_text import TomlFile
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declared import (
     ANY_KEY,
@@ -48,20 +46,11 @@ def keyed(declared: str | Field, default: Any = MISSING) -> Any:
     return field(default=default, metadata={KIND: mark})
 
 
-def read_record(kind: TomlKind, record: type[Record], name_or_path: str | Path) -> tuple[Record, str]:
-    """Read a file by bundled name or path as a record. Returns the record and the label used in messages."""
-    file = label(str(name_or_path))
-    content = kind.read(name_or_path)
-    return checked_record(record, kind.parse(content, file), file, kind.error, content), file
-
-
-def checked_record(
-    record: type[Record], document: Mapping[str, Any], file: str, refusal: type[PpafoError], content: bytes = b""
-) -> Record:
-    """Return a document as a record. Raises ``refusal`` with all faults, by line of the ``content`` of its file."""
+def checked_record(record: type[Record], source: TomlFile) -> Record:
+    """Return the document of a file as a record. Raises the error of the file with all faults, by line."""
     layout: Any = record
-    check_keys(document, fields_of(layout), file, refusal, content)
-    return record_from(record, document)
+    check_keys(source, fields_of(layout))
+    return record_from(record, source.document)
 
 
 def record_schema(record: Any, title: str) -> dict[str, Any]:

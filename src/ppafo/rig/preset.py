@@ -11,7 +11,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ppafo.documents.toml_text import TomlKind, label
+from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import ParameterError, UnitError, refused_as
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declared import (
@@ -108,10 +108,9 @@ def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Pres
     ``overrides`` are texts such as ``rig.pressure_sensor.noise=0 Pa_d``. Raises ParameterError for an invalid preset or
     override.
     """
-    file = label(str(name_or_path))
-    content = _FILE.read(name_or_path)
-    document = _FILE.parse(content, file)
-    check_keys(document, declared(document), file, ParameterError, content)
+    source = _FILE.load(name_or_path)
+    document = source.document
+    check_keys(source, declared(document))
     values = {
         path: float(quantity.default or 0.0)
         if (given := value_at(document, path)) is None

@@ -67,16 +67,13 @@ def request_of_file(
     file: TomlKind = FILE,
 ) -> DocumentReader:
     """Return the request for the scenario of a file."""
-    name = label(str(name_or_path))
-    content = file.read(name_or_path)
-    document = FILE.parse(content, name)
-    text = decoded(content)
+    source = FILE.parse(file.read(name_or_path), label(str(name_or_path)), Path(name_or_path).parent)
     return DocumentReader(
-        name,
-        document,
-        text=text,
+        source.label,
+        source.document,
+        text=decoded(source.content),
         path=str(name_or_path),
-        folder=Path(name_or_path).parent,
+        folder=source.folder,
         overrides=overrides,
         parameter_set=parameter_set,
     )

@@ -5,14 +5,14 @@ A map is part of a TOML file, ``[columns.NAME]``. ``foreign.py`` reads a recordi
 
 from collections.abc import Collection, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib import resources
 from itertools import islice
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
-from ppafo.documents.toml_text import TomlKind, label
+from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import DataError, refused_as
 from ppafo.model.declaration import Number, Quantity
 from ppafo.parameters.declared import Many, Words
@@ -111,10 +111,10 @@ def load_column_map(path: str | Path, name: str | None = None) -> ColumnMap:
 
     Raises DataError if there is no such map, or if there are several and no name is given.
     """
-    file = label(str(path))
-    content = _FILE.read(path)
-    document = {key: table for key, table in _FILE.parse(content, file).items() if key == "columns"}
-    maps = checked_record(_ColumnMaps, document, file, DataError, content).columns
+    source = _FILE.load(path)
+    file = source.label
+    document = {key: table for key, table in source.document.items() if key == "columns"}
+    maps = checked_record(_ColumnMaps, replace(source, document=document)).columns
     if name is None and len(maps) > 1:
         raise DataError(f"{file}: has several column maps; name one as {file}:NAME; available: {', '.join(maps)}")
     if name is not None and name not in maps:

@@ -2,7 +2,7 @@
 
 import copy
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.arguments import Count, Overrides, Seed, checked
-from ppafo.documents.toml_text import TomlKind, label
+from ppafo.documents.toml_text import TomlFile, TomlKind
 from ppafo.errors import (
     DataError,
     Faults,
@@ -95,25 +95,15 @@ def load_study(
     >>> [configuration.name for configuration in study.configurations]
     ['proportional', 'solenoid']
     """
-    return _load(*read_source(FILE, study), tuple(overrides), draws, seed)
+    return _load(read_source(FILE, study), tuple(overrides), draws, seed)
 
 
-@dataclass(frozen=True, slots=True)
-class _StudySource:
-    """Source of a study: its name in messages, folder of its relative paths, and its text, empty for plain data."""
-
-    file: str
-    folder: Path
-    text: bytes
-
-
-def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], _StudySource]:
-    """Read a TOML file of a ``kind``, by name or path, or plain data; returns a modifiable document and its source."""
-    if isinstance(named, Mapping):
-        kind.check_depth(named, kind.noun)
-        return copy.deepcopy(dict(named)), _StudySource(kind.noun, Path(), b"")
-    source = _StudySource(label(str(named)), Path(named).parent, kind.read(named))
-    return kind.parse(source.text, source.file), source
+def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> TomlFile:
+    """Read a TOML file of a ``kind``, by name or path, or plain data; the document may be changed."""
+    if not isinstance(named, Mapping):
+        return kind.load(named)
+    kind.check_depth(named, kind.noun)
+    return TomlFile(kind.noun, copy.deepcopy(dict(named)), kind.error)
 
 
 def study_of(
@@ -149,7 +139,8 @@ def drawn_in(
     base = configurations[name]
     if changes and not isinstance(study, Study):
         # The configuration alone, as the others may refuse the changes; without what it does not have.
-        document, source = read_source(FILE, study)
+        source = read_source(FILE, study)
+        document = source.document
         document["configurations"] = [table for table in document["configurations"] if table["name"] == name]
         varied = [table for table in document.get("vary", ()) if name in table.pop("only", [name])]
         paths = {table["path"] for table in varied}
@@ -158,7 +149,7 @@ def drawn_in(
         document["correlations"] = [table for table in pairs if paths.issuperset(table["between"])]
         metrics = [metric for metric in chosen.outputs.metrics if not lacking(base.scenario, METRICS[metric])]
         document["outputs"] = {"metrics": metrics}
-        chosen = _load(document, source, changes)
+        chosen = _load(source, changes)
         base = chosen.configurations[0]
     whole = uncertainty_of(chosen)
     kept = [row for row, drawn in enumerate(whole.drawn) if chosen.varies(drawn.path, name)]
@@ -176,21 +167,21 @@ def drawn_in(
 
 
 def _load(
-    document: dict[str, Any],
-    source: _StudySource,
+    source: TomlFile,
     changes: tuple[str, ...],
     draws: int | None = None,
     seed: int | None = None,
 ) -> Study:
     """Build a study from a document, into which changes, draws and seed from the command line are written."""
+    document = source.document
     tables = document.get("vary")
     for table in tables if isinstance(tables, list | tuple) else ():
         # Files omit the kind of a table with the key `same_as`.
         if isinstance(table, dict) and SAME_AS in table:
             table.setdefault("kind", SAME_AS)
-    parsed = checked_record(StudyFile, document, source.file, StudyError, source.text)
+    parsed = checked_record(StudyFile, source)
     sampling = {key: value for key, value in (("runs", draws), ("seed", seed)) if value is not None}
-    with refused_as(StudyError, source.file, StudyError):
+    with refused_as(StudyError, source.label, StudyError):
         if changes:
             unchanged = [_configuration(section, source.folder) for section in parsed.configurations]
             changed = configurations_with(unchanged, changes)
@@ -203,12 +194,12 @@ def _load(
             )
         if sampling:
             document["sample"] |= sampling
-    parsed = checked_record(StudyFile, document, source.file, StudyError, source.text)
-    with refused_as(StudyError, source.file, StudyError):
-        return _build(parsed, document, source, changes)
+    parsed = checked_record(StudyFile, source)
+    with refused_as(StudyError, source.label, StudyError):
+        return _build(parsed, source, changes)
 
 
-def _build(parsed: StudyFile, document: dict[str, Any], source: _StudySource, changes: tuple[str, ...]) -> Study:
+def _build(parsed: StudyFile, source: TomlFile, changes: tuple[str, ...]) -> Study:
     """Build the study of a parsed study file in SI units; StudyError with all mistakes that stand in the file."""
     wrong = Faults()
     configurations = []
@@ -296,8 +287,8 @@ def _build(parsed: StudyFile, document: dict[str, Any], source: _StudySource, ch
         given={path: unit for path, unit in given.items() if unit != shown_unit(varied[path].quantity.unit, {})},
         gauge=frozenset(gauge | {path for path, other in followed.items() if other in gauge}),
         only={entry["path"]: entry["only"] for entry in vary if entry.get("only")},
-        document=document,
-        text=source.text,
+        document=source.document,
+        text=source.content,
         changes=changes_in(*scenarios, overrides=changes),
     )
 

@@ -15,7 +15,7 @@ from ppafo.arguments import checked
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.profiles import KNOTS
-from ppafo.documents.toml_text import TomlKind, beside, label
+from ppafo.documents.toml_text import TomlFile, TomlKind, beside
 from ppafo.errors import (
     DataError,
     Faults,
@@ -236,11 +236,11 @@ def load_design(problem: str | Path, *, profile: str | Path | None = None, plugi
     >>> ppafo.load_design("push-off").name
     'push-off'
     """
-    file = label(str(problem))
-    folder = Path(problem).parent
     with at_fault("problem"):
-        content = FILE.read(problem)
-    document = checked_record(SizingFile, FILE.parse(content, file), file, StudyError, content)
+        source = FILE.load(problem)
+    file = source.label
+    folder = source.folder
+    document = checked_record(SizingFile, source)
     wrong = Faults()
     valves = {}
     bottles = []
@@ -348,7 +348,7 @@ def read_profile(table: ProfileSection, folder: Path, where: str) -> RequiredTor
         given = {key.strip(): value.strip() for key, _, value in (setting.partition("=") for setting in settings)}
         if len(given) < len(settings):
             raise StudyError(f"{place}: give mass and share once")
-        wearer = checked_record(GaitShare, given, place, StudyError)
+        wearer = checked_record(GaitShare, TomlFile(place, given, StudyError))
         with refused_as(StudyError, place, DataError):
             gait = load_gait(beside(name.strip(), folder))
             if gait.ankle_moment is None:

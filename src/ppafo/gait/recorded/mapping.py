@@ -17,7 +17,7 @@ from ppafo.errors import ArgumentError, DataError, Faults, UnitError, refused_as
 from ppafo.gait.gait import BODY_MASSES, SPEEDS, STATURES
 from ppafo.gait.recorded.table import LONGEST_FILLED
 from ppafo.parameters.declared import Many, Words
-from ppafo.parameters.records import SchemaVersion, keyed, read_record, record_schema
+from ppafo.parameters.records import SchemaVersion, checked_record, keyed, record_schema
 from ppafo.units import parse_quantity
 from ppafo.wording import argument_text
 
@@ -215,7 +215,9 @@ def package_map() -> GaitMap:
 
 def load_map(path: str | Path) -> GaitMap:
     """Load a gait map from a TOML file; raises DataError if it cannot be used."""
-    loaded, file = read_record(FILE, GaitMap, path)
+    source = FILE.load(path)
+    loaded = checked_record(GaitMap, source)
+    file = source.label
     wrong = []
     shank = loaded.shank_angle
     ankle = loaded.ankle_angle

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
-from ppafo.documents.toml_text import NAME, TomlKind, label
+from ppafo.documents.toml_text import NAME, TomlKind
 from ppafo.errors import Faults, ParameterError, UnitError, refused_as
 from ppafo.model.cold_gas import ColdSupply, Passage
 from ppafo.model.declaration import Quantity
@@ -255,12 +255,11 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
 
 def _read(name_or_path: str | Path) -> tuple[dict[str, Any], dict[str, Entry], str]:
     """Read and check a bottle file. Returns its document, its numbers by dotted path, and its label in messages."""
-    file = label(str(name_or_path))
-    content = FILE.read(name_or_path)
-    document = FILE.parse(content, file)
-    check_keys(document, declared(document), file, ParameterError, content)
+    source = FILE.load(name_or_path)
+    document = source.document
+    check_keys(source, declared(document))
     tables = {path: table for path in PATHS if (table := value_at(document, path)) is not None}
-    return document, {path: record_from(Entry, table) for path, table in tables.items()}, file
+    return document, {path: record_from(Entry, table) for path, table in tables.items()}, source.label
 
 
 def _build(parsed: Mapping[str, Any], entries: Mapping[str, Entry], file: str) -> Bottle:

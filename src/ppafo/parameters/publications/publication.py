@@ -15,7 +15,7 @@ from typing import Literal
 from ppafo.documents.toml_text import NAME, TomlKind
 from ppafo.errors import ScenarioError
 from ppafo.parameters.declared import IDENTIFIER, Words
-from ppafo.parameters.records import SchemaVersion, keyed, read_record, record_schema
+from ppafo.parameters.records import SchemaVersion, checked_record, keyed, record_schema
 from ppafo.wording import first_twice
 
 PAPER = "ppafo-2011"
@@ -64,7 +64,9 @@ json_schema = partial(record_schema, PublicationFile, "ppafo publication")
 
 def read_publication(name_or_path: str | Path) -> tuple[PublicationFile, str]:
     """Read a publication by name or file; also return the file label. Raises ScenarioError if invalid."""
-    read, file = read_record(FILE, PublicationFile, name_or_path)
+    source = FILE.load(name_or_path)
+    read = checked_record(PublicationFile, source)
+    file = source.label
     twice = first_twice(entry.id for entry in read.claims)
     if twice is not None:
         raise ScenarioError(f"{file}: claims: '{twice}' appears twice")

@@ -9,6 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from ppafo.constants import PASCALS_PER_PSI
+from ppafo.documents.toml_text import TomlFile
 from ppafo.errors import IdentificationError
 from ppafo.identification.fit import FitNumber
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
@@ -51,7 +52,7 @@ def test_tolerances_are_read_with_their_units() -> None:
 )
 def test_a_tolerance_that_is_none_is_refused_in_one_line(key: str, text: str, words: str) -> None:
     with pytest.raises(IdentificationError, match=f"^file: {key} = '{text}': .*{words}"):
-        checked_record(Tolerances, {key: text}, "file", IdentificationError)
+        checked_record(Tolerances, TomlFile("file", {key: text}, IdentificationError))
 
 
 def test_supplies_are_those_of_a_recording_and_zeros_and_gains_those_of_a_sensor(experiment: FittedExperiment) -> None:
