@@ -32,7 +32,7 @@ class Progress:
         """Return the progress as text."""
         words = [f"{self.activity} ..."] if self.activity and not self.total else [self.activity] * bool(self.activity)
         if self.total:
-            total = f"{'at most ' * self.is_bound}{self.total:,} {self.noun}"
+            total = f"{'at most ' if self.is_bound else ''}{self.total:,} {self.noun}"
             words.append(f"{self.done:,} of {total} ({100.0 * self.done / self.total:.0f} %)")
         if self.total and self.done > self.earlier and self.elapsed > 0.0:
             rate = (self.done - self.earlier) / self.elapsed

@@ -333,7 +333,7 @@ def _finding(found: Threshold, rows: ask.Rows, row: int, kind: ask.Kind, base: S
     # Values that meet the condition although the run does not follow its reference.
     missed = 0 if is_verdict else int(np.count_nonzero(rows["is_missed"] & rows["is_kept"]))
     meets = "lets the run follow its reference" if is_verdict else f"meets {found.condition}"
-    meets += " and follows its reference" * bool(missed)
+    meets += " and follows its reference" if missed else ""
     name = found.metric
     number = float(rows["metric"][row])
     if rows["judged"][row] > number:
@@ -376,15 +376,19 @@ def _finding(found: Threshold, rows: ask.Rows, row: int, kind: ask.Kind, base: S
         remarks.append(f"at {on_purpose} values the condition is met, with a reference beyond reach on purpose")
     # Ends of intervals that are values of the grid are not bracketed as the value found is.
     grid = values[rows["is_of_grid"]]
-    met = f"the condition is met{' and the reference followed' * bool(missed)}"
+    met = f"the condition is met{' and the reference followed' if missed else ''}"
     exact = (values[0], values[-1], found.value)
     inner = ", ".join(kind.number(end) for interval in found.met for end in interval if end not in exact)
     beyond = f"of the grid; the condition may be met up to {kind.change(grid[1] - grid[0])} beyond"
-    drawn = "error, swing, peak or command reversals, each divided by its limit, whichever is largest," * is_verdict
+    drawn = (
+        "error, swing, peak or command reversals, each divided by its limit, whichever is largest,"
+        if is_verdict
+        else ""
+    )
     return ask.Finding(
         name="find",
         kicker="Search",
-        title=f"The {found.wanted} {found.path} such that {'the run ' * is_verdict}{found.condition}",
+        title=f"The {found.wanted} {found.path} such that {'the run ' if is_verdict else ''}{found.condition}",
         said=(said, *remarks),
         parts=(
             ask.Section(

@@ -473,15 +473,15 @@ def _figure(results: StudyResults) -> ask.Section:
     if is_mapped:
         metrics += [FOLLOWS] if {0.0, 1.0} <= set(results.table([FOLLOWS])[FOLLOWS].tolist()) else []
     title = f"{results.name}, {results.summary['completed']:,} runs"
-    title += f" over {len(varied)} values" * (not is_mapped and len(varied) > 1)
+    title += f" over {len(varied)} values" if not is_mapped and len(varied) > 1 else ""
     count = len(metrics) + len(study["outputs"].get("bands", ()))
     return ask.Section(
         said=[" ".join(study["description"].split())] if study.get("description") else [],
         panels=partial(_panels, results, metrics, names, varied, grid),
         name="figure",
-        caption=f"Not drawn, because without a difference in the runs: {constant}. " * bool(constant)
-        + f"Not drawn, unless outputs.metrics names at most {most}: {left_out}. " * bool(left_out)
-        + f"{'; '.join(_tracking_texts(results))}." * (FOLLOWS in metrics),
+        caption=(f"Not drawn, because without a difference in the runs: {constant}. " if constant else "")
+        + (f"Not drawn, unless outputs.metrics names at most {most}: {left_out}. " if left_out else "")
+        + (f"{'; '.join(_tracking_texts(results))}." if FOLLOWS in metrics else ""),
         across=len(names) if is_compared else min(2, max(1, count)),
         size=(2.7, 2.3) if is_compared else (2.9, 2.4),
         title=title,

@@ -416,7 +416,7 @@ def solve_tuning(
     # As many as are made if no start converges early: the first candidates are a generation of their own, the gains
     # before run for the scales and for their result, the gains found once, and both over fresh draws.
     of_start = len(problem.searched) * (effort.candidates_per_gain * (effort.generations + 1) + _REFINEMENTS)
-    most = problem.draws * (effort.starts * of_start + 3) + 2 * FRESH_DRAWS * bool(uncertainty.drawn)
+    most = problem.draws * (effort.starts * of_start + 3) + (2 * FRESH_DRAWS if uncertainty.drawn else 0)
     counter = ask.RunCounter(most, lambda now: report(replace(now, activity="tuning", is_bound=True)))
     gauge = uncertainty.gauge | {gain.place.path for gain in problem.searched if gain.place.is_gauge}
     # The fresh draws follow those of the search: the gains were not chosen on them.
@@ -646,7 +646,9 @@ def _verdict(problem: Problem, before: GainResult, after: GainResult, useless: s
     beyond = (
         "; the reference requires more torque than the actuator gives at the supply pressure"
         f"{where(after.beyond_reach)}, which no gains can change"
-    ) * (after.beyond_reach > 0.0)
+        if after.beyond_reach > 0.0
+        else ""
+    )
     if after.share_without_value:
         failing = percentage(after.share_without_value, 3)
         return f"with the best gains found, {failing} of the runs fail, oscillate, or lack a required metric"

@@ -80,7 +80,7 @@ def _values(function: str, signature: inspect.Signature, /, *args: Any, **kwargs
         values = signature.bind_partial(*args, **kwargs).arguments
     except TypeError as error:
         near = next((nearest_name(name, parameters) for name in kwargs if name not in parameters), "")
-        known = ", ".join(f"{name}{'=' * (item.kind is item.KEYWORD_ONLY)}" for name, item in parameters.items())
+        known = ", ".join(f"{name}{'=' if item.kind is item.KEYWORD_ONLY else ''}" for name, item in parameters.items())
         raise ArgumentError(f"{function}(): {error}{near}; available: {known}") from None
     missing = [name for name, item in parameters.items() if item.default is item.empty and name not in values]
     if missing:

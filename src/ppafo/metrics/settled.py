@@ -571,7 +571,7 @@ OF_RUN = ("begun", "lowest", "highest", "top", "bottom", "lowest_asked", "highes
 _SETTLED = f"meters.{SETTLED.name}"
 _NUMBERS: dict[str, Callable[[Readings], Floats]] = {
     **{
-        f"{prefix}_{name}": ReadAt((f"{_SETTLED}.{part}.{name}{'.turns' * name.endswith('swing')}",))
+        f"{prefix}_{name}": ReadAt((f"{_SETTLED}.{part}.{name}{'.turns' if name.endswith('swing') else ''}",))
         for prefix, part in (("settled", "part"), ("before", "before"), ("worst", "worst"))
         for name in PART_SUMS
     },

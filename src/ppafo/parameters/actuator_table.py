@@ -161,7 +161,7 @@ def _units(header: Sequence[str], file: str) -> dict[str, str]:
         units[name] = unit
     missing = [name for name in _NEEDED if name not in units]
     if missing:
-        raise ParameterError(f"{file}: column{'s' * (len(missing) > 1)} {said_missing(missing)}")
+        raise ParameterError(f"{file}: column{'s' if len(missing) > 1 else ''} {said_missing(missing)}")
     return units
 
 

@@ -262,7 +262,9 @@ class FieldLayout:
             return
         elif isinstance(field, InnerTable):
             required = [gap.rpartition(".")[2] for gap, _ in self._gaps(path, is_given=True)]
-            keys = f" with the key{'s' * (len(required) > 1)} {', '.join(required)}" if required else f", [{path}]"
+            keys = (
+                f" with the key{'s' if len(required) > 1 else ''} {', '.join(required)}" if required else f", [{path}]"
+            )
             words = "".join(f", or '{word}'" for word in field.words)
             yield path, f"{path} = {quote(value)} must be a table{keys}{words}"
         elif isinstance(field, Many) and field.holds(value):
@@ -275,10 +277,10 @@ class FieldLayout:
                 own = {at: of} if isinstance(of, Field) else inside(at, of(item if isinstance(item, Mapping) else {}))
                 yield from layout_of(own, self.reads_numbers)._inside(at, item)
         elif isinstance(field, Many):
-            count = f"{field.least} or more " * (field.least > 0)
+            count = f"{field.least} or more " if field.least > 0 else ""
             what = {Quantity: "numbers", Words: "texts"}.get(type(field.of), "tables")
-            what += f", [[{path}]]" * (what == "tables" and not field.keys)
-            most = f", at most {field.most:g}" * math.isfinite(field.most)
+            what += f", [[{path}]]" if what == "tables" and not field.keys else ""
+            most = f", at most {field.most:g}" if math.isfinite(field.most) else ""
             word = "".join(f", or '{word}'" for word in field.words)
             yield (
                 path,
@@ -322,7 +324,7 @@ class FieldLayout:
         )
         is_below = field.form is int and isinstance(value, int) and value < 1
         if not is_taken or is_below or (isinstance(value, float) and not math.isfinite(value)):
-            return f"{given} must be {_FORMS[field.form]}{': ' * bool(field.summary)}{field.summary}"
+            return f"{given} must be {_FORMS[field.form]}{': ' if field.summary else ''}{field.summary}"
         if field.pattern and isinstance(value, str) and not re.fullmatch(field.pattern, value):
             return f"{given} {RULES[field.pattern]}"
         return f"{given} must not be empty" if field.required and field.is_filled and value == "" else ""

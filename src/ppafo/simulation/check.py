@@ -210,7 +210,7 @@ class Check:
         for row, (value, unit) in values:
             changes = [without_exponent(metric_change(row.changes[name], row.unit)[0], "+.1e") for name in names]
             verdict = "" if row.is_determined else "sensitive"
-            extent = "range " * (row in self.courses)
+            extent = "range " if row in self.courses else ""
             rows.append([row.name, f"{extent}{value:.4g} {unit}".rstrip(), *changes, verdict])
         head = f"Check of '{self.scenario}': differences between runs that should be equal"
         return "\n".join([head, *align_columns(rows), "", self.sentence])

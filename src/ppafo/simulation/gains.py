@@ -61,7 +61,7 @@ class Gains:
             parts += [f"{', '.join(texts)} {origin}"] if texts else []
         without = f"; the load of {', '.join(self.unknown_loads)} is not included" if self.unknown_loads else ""
         light = f"; friction alone keeps the joint still: theta sqrt(S/I) = {self.lightness:.2g}, above {LIGHT:g}"
-        return f"gains: {'; '.join(parts)}{without}{light * (self.lightness > LIGHT)}"
+        return f"gains: {'; '.join(parts)}{without}{light if self.lightness > LIGHT else ''}"
 
 
 def loop_of(scenario: Scenario, law: ControllerKind) -> TorqueLoop:

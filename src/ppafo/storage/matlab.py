@@ -63,7 +63,7 @@ class _MatlabFile:
 
     def advice_on_objects(self) -> str:
         """Return the remedy, appended to messages, to save objects as arrays; empty without objects."""
-        named = ", ".join(f"{name}{f' ({kind})' * bool(kind)}" for name, kind in self.objects)
+        named = ", ".join(f"{name} ({kind})" if kind else name for name, kind in self.objects)
         return f"; only MATLAB reads the objects {named}: save their numbers there as plain arrays" if named else ""
 
 

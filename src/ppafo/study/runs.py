@@ -279,7 +279,7 @@ class TrackingCounts:
     @property
     def sentence(self) -> str:
         """Counts in words."""
-        unknown = f"; without a verdict: {self.without_verdict:,}" * (self.without_verdict > 0)
+        unknown = f"; without a verdict: {self.without_verdict:,}" if self.without_verdict > 0 else ""
         return (
             f"the reference is followed in {self.follow:,} of {self.runs:,} runs, not in {self.do_not_follow:,}; "
             f"beyond reach on purpose: {self.beyond_reach_on_purpose:,}{unknown}"

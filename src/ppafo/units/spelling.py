@@ -330,7 +330,9 @@ def split_pressure_kind(unit: str) -> tuple[str, str]:
     # J/kgK has both kg and K in its denominator.
     normal = re.sub(rf"/({_FACTOR}(?: {_FACTOR})+)", r"/(\1)", spaced) if spaced != normal else normal
     force = _FORCES.fullmatch(normal)
-    return force.expand(r"\1\4\5f\6") + f" {force[2] or force[3]}" * (force[6] is None) if force else normal, kind
+    return force.expand(r"\1\4\5f\6") + (
+        f" {force[2] or force[3]}" if force[6] is None else ""
+    ) if force else normal, kind
 
 
 def _as_product(name: str) -> str:

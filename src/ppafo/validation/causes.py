@@ -355,7 +355,7 @@ def _wrong_samples(channel: ChannelAgreement, times: Floats) -> tuple[str, NDArr
     is_out[1:-1] |= is_out_on_flank[1:-1]
     outliers = int(is_out.sum())
     first = f"{float(times[int(np.argmax(is_out))]):.6g} s"
-    said = f"has {outliers} isolated outlier{'s' * (outliers > 1)}, the first at {first}"
+    said = f"has {outliers} isolated outlier{'s' if outliers > 1 else ''}, the first at {first}"
     return said if outliers else "", is_out, True
 
 

@@ -193,7 +193,7 @@ class Sizing:
             if (peak := np.max(sign * profile.knot_values)) > _WHOLE_PEAK * profile.largest
             and (reached := np.max(sign * recording["torque"])) < REACHED * peak
         ]
-        reaches = f"; reaches {' and '.join(short)} in the simulated run" * bool(short)
+        reaches = f"; reaches {' and '.join(short)} in the simulated run" if short else ""
         suggested = f"suggested: {choice.name} at {PRESSURE.text(choice.pressure)}{bottle}"
         return f"{suggested}, the smallest that lasts and keeps the error limit{self._cut_peak(choice)}{reaches}"
 
@@ -382,7 +382,7 @@ def _size_valve(trials: Trials, name: str) -> SizedValve:
         if (failing := tried["pressure"][~works & (tried["pressure"] > lowest)]).size:
             remarks.append(f"at {PRESSURE.text(float(failing[0]))} the error limit is exceeded again")
         if is_cold:
-            smaller = " smaller" * (bottle is not None)
+            smaller = " smaller" if bottle is not None else ""
             remarks.append(f"a{smaller} bottle has enough gas, but gets too cold before the end")
         if bottles[chosen] is None:
             largest = problem.bottles[-1].name

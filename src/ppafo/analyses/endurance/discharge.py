@@ -493,7 +493,7 @@ def finding_of(results: dict[str, Endurance]) -> Finding[Any]:
         # Heat that warms the gas of the full bottle to the room's temperature behind the regulator.
         content = bottle_content(full.fluid.table, full.mass, full.volume, full.room_temperature)
         heat = heat_to_warm(full.fluid.table, content, full.room_temperature, full.regulator.set_pressure)
-        of_device = ", the supply pressure of the device" * (full.entries[SET_PRESSURE].origin == "derived")
+        of_device = ", the supply pressure of the device" if full.entries[SET_PRESSURE].origin == "derived" else ""
         walked = f"{duration_text(first.walking_time)} of {'use' if counted == 'repetition' else 'walking'}"
         flows = f"{flow(first.mean_flow)}, largest {flow(first.peak_flow)}"
         when_warm = f"{strides_text(first.strides_when_warm)} (a bottle that stays at room temperature)"

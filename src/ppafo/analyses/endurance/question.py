@@ -103,7 +103,9 @@ def bottle(
     most = 0.5 * MAXIMUM_INTERVALS * (schedule.walk + schedule.rest) if rest else math.inf
     for name, value, largest in (("walk", schedule.walk, math.inf), ("longest", longest, most)):
         if not _SHORTEST <= value <= largest:
-            limits = f"at least {_SHORTEST:g} s" + f", at most {largest:g} s with such rests" * (value > largest)
+            limits = f"at least {_SHORTEST:g} s" + (
+                f", at most {largest:g} s with such rests" if value > largest else ""
+            )
             raise ParameterError(f"{argument_text(name)} = {value:g} s: must be {limits}")
     changes = tuple(overrides)
     chosen = PAPER_BOTTLE if bottle is None else bottle

@@ -179,7 +179,9 @@ def _reach_text(reach: float, upwards: bool) -> str:
     if upwards:
         return f"at most {level_text('N m', reach)}"
     # Of an actuator that always pushes, the smallest torque is positive.
-    return f"{'at least' if reach > 0.0 else 'at most'} {level_text('N m', abs(reach))}{_NEGATIVE * (reach <= 0.0)}"
+    return (
+        f"{'at least' if reach > 0.0 else 'at most'} {level_text('N m', abs(reach))}{_NEGATIVE if reach <= 0.0 else ''}"
+    )
 
 
 def torque_beyond_reach(case: Case) -> str:
@@ -226,7 +228,7 @@ def _load_beyond_reach(case: Case) -> str:
     against = f" to break its static friction of {level_text('N m', holding)}" if is_within else ""
     reach = highest if is_high else lowest
     one_way = abs(reach) <= _ONE_WAY * max(abs(lowest), abs(highest))
-    gives = f"the actuator gives {_reach_text(reach, is_high)}{': it acts in one direction only' * one_way}"
+    gives = f"the actuator gives {_reach_text(reach, is_high)}{': it acts in one direction only' if one_way else ''}"
     return f"{rests}the load needs {level_text('N m', needed)} at {level_text('rad', wanted)}{against}, {gives}"
 
 
@@ -276,7 +278,7 @@ def _step_of_valves(case: Case) -> str:
     declare = switching_remedy(scenario.controller.kind)
     asks = f"`{law.name}` requests partial openings, which on/off valves do not have{declare}: "
     in_time = f"in their dead time of {1.0e3 * loop.dead_time:.3g} ms, {ratio:.2g} times the requested change"
-    partial = asks * (is_pair(scenario) and not law.only_switches)
+    partial = asks if is_pair(scenario) and not law.only_switches else ""
     return f"{partial}the valves cause a step of {change_text(controlled, step)} {in_time}"
 
 

@@ -224,7 +224,7 @@ def _decided(case: Case, turning: float, rate: float) -> tuple[Criterion, float,
     wanted = text(change if walks else min(change, extent(case.recording)))
     if case.failure == "does not move":
         moved = text(settled.value_range).partition(" ")[0]
-        at = when * (settled.end > 0.0)
+        at = when if settled.end > 0.0 else ""
         found = f"the {words} loop does not move: {moved} of the requested {wanted}{at}"
         return "movement", settled.value_range, SMALLEST_MOVE * change, found
     if case.overshoots:
@@ -256,7 +256,8 @@ def _decided(case: Case, turning: float, rate: float) -> tuple[Criterion, float,
             )
             rounded = _distinct(lambda each, digits: float(f"{each:.{digits}g}"), number, limit)
             often, most = (without_exponent(each, ".3g") for each in rounded)
-            span = f"a {'stride' if scenario.motion.stride_time else 'second'}{' of the whole run' * is_of_command}"
+            unit = "stride" if scenario.motion.stride_time else "second"
+            span = f"a {unit} of the whole run" if is_of_command else f"a {unit}"
             found = f"{often} {criterion} {span} ({most} allowed), RMS error {text(settled.rms_error)}"
             return criterion, number, limit, f"the {words} loop oscillates: {found} (requested {wanted}){when}"
         criterion, number, limit = swing if is_swing else (criterion, number, limit)
@@ -410,7 +411,7 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float] | None:
     ratios = [excess_of_part(part, switches) for part in parts]
     # An earlier part decides where it fails and the last one does not, or fails less. The reach is that of all parts.
     errors = [float(np.nan_to_num(np.max(each[:-1]))) for each in ratios]
-    largest = [errors[0], *(error * (error > 1.0) for error in errors[1:])]
+    largest = [errors[0], *((error if error > 1.0 else 0.0) for error in errors[1:])]
     place = int(np.argmax(largest))
     excess = ratios[place]
     settled = parts[place]
