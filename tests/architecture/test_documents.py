@@ -227,6 +227,24 @@ def test_the_page_on_architecture_lists_every_room_and_no_other() -> None:
     assert listed == packages | modules
 
 
+def test_every_name_on_the_page_of_the_architecture_is_there() -> None:
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    folders = (SOURCE, ROOT / "tests", ROOT / "scripts")
+    modules = {path: path.read_text(encoding="utf-8") for folder in folders for path in folder.rglob("*.py")}
+    words = set(re.findall(r"\w+", "\n".join([*modules.values(), (ROOT / "pyproject.toml").read_text()])))
+    identifiers = re.findall(r"`(\w+)`", page)
+    assert [name for name in identifiers if name not in words] == []
+    # A name behind a file is one of this file.
+    of_files = re.findall(r"`([\w/]+/\w+\.py)` \(((?:`[\w.]+`(?:, )?)+)\)", page)
+    lost = [
+        (file, name)
+        for file, names in of_files
+        for name in re.findall(r"`(?:\w+\.)?(\w+)`", names)
+        if not re.search(rf"\b{name}\b", modules[SOURCE / file])
+    ]
+    assert lost == []
+
+
 def test_the_documents_stay_short() -> None:
     words = {page: len(page.read_text(encoding="utf-8").split()) for page in ROOT.rglob("*.md") if _is_ours(page)}
     assert words[ROOT / "README.md"] <= 500
