@@ -540,8 +540,12 @@ def _part(found: Influences, metric: MetricSensitivity) -> ask.Section:
     order = np.argsort(-ranking).tolist()
     columns = [ask.Column("value", [found.paths[row] for row in order])]
     for name, values in indices.values.items():
-        columns.append(ask.Column(_TITLES[name], [f"{round(values[row], 3) + 0.0:.3f}" for row in order]))
-        columns.append(ask.Column("band", [f"± {indices.bands[name][row]:.3f}" for row in order]))
+        columns.extend(
+            (
+                ask.Column(_TITLES[name], [f"{round(values[row], 3) + 0.0:.3f}" for row in order]),
+                ask.Column("band", [f"± {indices.bands[name][row]:.3f}" for row in order]),
+            )
+        )
     changes = [metric.change_from_5_to_95_percent[row] for row in order]
     ends = [f"± {kind.change_number(metric.band_of_change[row], '.2g')}" for row in order]
     bands = [None if math.isnan(change) else end for change, end in zip(changes, ends, strict=True)]
@@ -587,11 +591,11 @@ def _panels(found: Influences) -> list[ask.Panel]:
         axes.set_xticks(ticks, [str(size) for size in ticks])
         axes.minorticks_off()
 
-    panels = []
+    panels = list[ask.Panel]()
     for metric in found.metrics:
         indices = metric.indices
         bars = []
-        courses = []
+        courses = list[ask.Mark]()
         name = next(iter(indices.values))
         sizes = [step.blocks for step in metric.settling]
         order = np.argsort(-indices.values[name])
@@ -610,14 +614,20 @@ def _panels(found: Influences) -> list[ask.Panel]:
         for row, colour in zip(order[:_MAXIMUM_LINES], colours, strict=False):
             values, bands = settled[:, :, row].T
             line = {"marker": ask.MARKERS.get(colour, "o"), "markersize": 3.5, "linewidth": 1.2}
-            courses.append(ask.Mark("line", sizes, values, colour=colour, style=line))
-            courses.append(ask.Mark("band", sizes, np.stack([values - bands, values + bands]), colour=colour))
+            courses.extend(
+                (
+                    ask.Mark("line", sizes, values, colour=colour, style=line),
+                    ask.Mark("band", sizes, np.stack([values - bands, values + bands]), colour=colour),
+                )
+            )
         named = partial(name_values, places=places, labels=[ask.label_of(found.paths[row]) for row in order])
         words = ask.of_metric(metric.metric).words
         title = f"{_TITLES[name].capitalize()}, {len(courses) // 2} largest"
         axis = ask.Kind(found.noun.capitalize())
-        panels.append(
-            ask.Panel(ask.Kind("Fraction of the variance"), ask.Kind(), bars, words, legend="figure", then=named)
+        panels.extend(
+            (
+                ask.Panel(ask.Kind("Fraction of the variance"), ask.Kind(), bars, words, legend="figure", then=named),
+                ask.Panel(axis, ask.Kind(), courses, title, then=partial(set_sizes, sizes=sizes)),
+            )
         )
-        panels.append(ask.Panel(axis, ask.Kind(), courses, title, then=partial(set_sizes, sizes=sizes)))
     return panels

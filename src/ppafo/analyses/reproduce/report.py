@@ -155,8 +155,12 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
     task = partial(_torque_task_panels, reproduction)
     # Its grey curves are a synthetic measurement, so that the figure is marked as synthetic.
     origin = None if isinstance(synthetic, str) else synthetic.step.kind
-    parts.append(Section(name=STEP_FIGURE, panels=step, across=2, size=(3.15, 1.0), kind=origin, is_detail=True))
-    parts.append(Section(name=TORQUE_FIGURE, panels=task, size=(6.3, 1.0), is_detail=True))
+    parts.extend(
+        (
+            Section(name=STEP_FIGURE, panels=step, across=2, size=(3.15, 1.0), kind=origin, is_detail=True),
+            Section(name=TORQUE_FIGURE, panels=task, size=(6.3, 1.0), is_detail=True),
+        )
+    )
     if not isinstance(synthetic, str):
         draw = partial(figure_3, synthetic.torque, synthetic.decay)
         parts.append(Section(name=IDENTIFICATION_FIGURE, draw=draw, is_detail=True))
@@ -256,8 +260,12 @@ def _step_panels(reproduction: Reproduction) -> list[Panel]:
             band = np.minimum.reduceat(readings, starts), np.maximum.reduceat(readings, starts)
             thin = {"linestyle": "-", "linewidth": 0.8, "zorder": 2}
             pale = {"alpha": 0.3, "zorder": 1}
-            marks.append(Mark("line", time, readings, (), "synthetic measurement", style.EXPERIMENT.colour, thin))
-            marks.append(Mark("band", time[starts] + 0.5 * _BIN, band, colour=style.EXPERIMENT.colour, style=pale))
+            marks.extend(
+                (
+                    Mark("line", time, readings, (), "synthetic measurement", style.EXPERIMENT.colour, thin),
+                    Mark("band", time[starts] + 0.5 * _BIN, band, colour=style.EXPERIMENT.colour, style=pale),
+                )
+            )
             error = readings - np.interp(synthetic.time, recording.time, model)
             beside = [
                 Mark("line", time, error, colour=style.EXPERIMENT.colour, style={"linewidth": 0.9}),
@@ -324,7 +332,7 @@ def _torque_task_panels(reproduction: Reproduction) -> list[Panel]:
         return Mark("band", ends, edges, label=label, colour=colour, style={"alpha": alpha})
 
     torques = []
-    gas = []
+    gas = list[Mark]()
     errors = [Mark("level", y=0.0, colour=style.GREY, style={"linewidth": 0.8})]
     # Grey in the legend, as the bars have the colours of the valves.
     places = [
@@ -349,8 +357,12 @@ def _torque_task_panels(reproduction: Reproduction) -> list[Panel]:
         torques.append([*marks, Mark("line", run.time, run["torque"], label="simulated", colour=colour)])
         errors.append(Mark("line", run.time, run["reference"] - run["torque"], colour=colour))
         label = f"{valve}: {GRAMS_PER_KILOGRAM * supplied:.2f} g, in the paper {in_paper[valve]:g} g"
-        gas.append(Mark("line", run.time, run["supplied_mass"], label=label, colour=colour))
-        gas.append(Mark("level", y=in_paper[valve] / GRAMS_PER_KILOGRAM, colour=colour, style=_LEVEL))
+        gas.extend(
+            (
+                Mark("line", run.time, run["supplied_mass"], label=label, colour=colour),
+                Mark("level", y=in_paper[valve] / GRAMS_PER_KILOGRAM, colour=colour, style=_LEVEL),
+            )
+        )
         inside = supplied - vented
         label = f"   {GRAMS_PER_KILOGRAM * inside:.2f} + {GRAMS_PER_KILOGRAM * vented:.2f} g"
         places += [

@@ -63,8 +63,17 @@ _LEAST_LEAN_OF_PART = 0.1
 
 _IN_SWING = 0.1
 """Fraction of the samples [-] that are in swing at least."""
-_ZEROS = 0.01, 0.1
-"""Least and largest zero error of a plate [body weights]."""
+# Least and largest zero error of a plate [body weights].
+_LEAST_ZERO = 0.0075
+_LARGEST_ZERO = 0.1
+_END_OF_SWING = 0.15
+"""Ends of a swing in which the plate may be loaded [swings]."""
+_TOUCHED = 0.1
+"""Largest part of the rest of a swing in which noise loads the plate [swings]."""
+_SHIFTED = 0.2
+"""Largest difference of an event in force and shank [strides]."""
+_REPEATS = 0.1
+"""Spread of strides that confirm others [strides]."""
 
 Contact = tuple[float | None, float | None]
 """Heel strike and toe-off [s]; None for an end that is outside the record."""
@@ -228,7 +237,8 @@ class Footfalls:
     """Strides found in a walk, with their source.
 
     ``walk`` holds the signals by name, ``events`` names the source of the strides. ``is_overground`` is True if some
-    strides are off the plates, ``is_one_cycle`` if the record is one cycle that was repeated.
+    strides are off the plates, ``is_one_cycle`` if the record is one cycle that was repeated. ``shared`` are strides
+    left out with the other foot on the plate.
     """
 
     walk: Mapping[str, Signal]
@@ -237,6 +247,7 @@ class Footfalls:
     remarks: tuple[str, ...] = ()
     is_overground: bool = False
     is_one_cycle: bool = False
+    shared: tuple[Stride, ...] = ()
 
 
 def find_footfalls(
@@ -246,15 +257,15 @@ def find_footfalls(
     if any(table.is_mean_stride for table in tables):
         turned = _of_walk(walk, (), side, 1)
         return replace(turned, strides=usable_strides(walk, turned.strides)[:1], is_one_cycle=True)
-    # In swing a plate shows its zero.
-    zero = float(np.quantile(walk[FORCE].values, _IN_SWING)) if FORCE in walk else 0.0
-    if _ZEROS[0] < abs(zero) < _ZEROS[1]:
-        zeroed = replace(walk[FORCE], values=walk[FORCE].values - zero)
-        footfalls = find_footfalls({**walk, FORCE: zeroed}, tables, side, given_least)
-        remark = f"vertical_force reads {zero:+.2%} of body weight in swing: taken as zero of the plate"
-        return replace(footfalls, remarks=(*footfalls.remarks, remark))
     least = given_least or LEAST_STRIDES
+    # In swing a plate shows its zero, with the other foot on it in most of them too.
+    zero = float(np.quantile(walk[FORCE].values, _IN_SWING)) if FORCE in walk else 0.0
+    remarks: tuple[str, ...] = ()
+    if _LEAST_ZERO < abs(zero) < _LARGEST_ZERO:
+        walk = {**walk, FORCE: replace(walk[FORCE], values=walk[FORCE].values - zero)}
+        remarks = (f"vertical_force reads {100.0 * zero:+.2g} % of body weight in swing: taken as zero of the plate",)
     footfalls = _of_walk(walk, tables, side, least)
+    footfalls = replace(footfalls, remarks=(*footfalls.remarks, *remarks))
     usable = usable_strides(walk, footfalls.strides)
     if len(usable) >= (1 if footfalls.is_overground else least) or least > LEAST_STRIDES:
         return footfalls
@@ -292,20 +303,55 @@ def _of_walk(walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Si
         if recorded:
             return Footfalls(walk, recorded, FILE, is_overground=True)
         return Footfalls(walk, strides_from_shank(walk[SHANK]), SHANK)
+    leaning = _leaning(walk)
     forced = strides_from_force(walk[FORCE])
-    if len(usable_strides(walk, forced)) >= least:
-        return Footfalls(walk, forced, FORCE)
+    alone = _without_other_foot(Footfalls(walk, forced, FORCE), leaning)
+    if len(usable_strides(walk, alone.strides)) >= least:
+        return alone
     contacts = [ends for ends in contacts_of(walk[FORCE]) if ends != (None, None)]
     if recorded and contacts and len(usable_strides(walk, recorded)) > len(usable_strides(walk, forced)):
         return Footfalls(walk, recorded, FILE, is_overground=True)
-    leaning: list[Stride] = []
-    # The force has a stride or none, and its message says more than the shank's.
-    with suppress(DataError):
-        leaning = strides_from_shank(walk[SHANK]) if contacts else []
-    if len(usable_strides(walk, leaning)) <= len(usable_strides(walk, forced)):
+    if not contacts or len(usable_strides(walk, leaning)) <= len(usable_strides(walk, alone.strides)):
         return Footfalls(walk, forced, FORCE)
     corrected, remark = _by_contacts(leaning, contacts)
-    return Footfalls(walk, corrected, SHANK, (remark,), is_overground=True)
+    by_shank = Footfalls(walk, corrected, SHANK, (remark,), is_overground=True)
+    alone = _without_other_foot(by_shank, ())
+    return alone if len(usable_strides(walk, alone.strides)) >= least else by_shank
+
+
+def _leaning(walk: Mapping[str, Signal]) -> list[Stride]:
+    """Return the strides from the shank, none if it shows no toe-off: beside a force its message says less."""
+    with suppress(DataError):
+        return strides_from_shank(walk[SHANK])
+    return []
+
+
+def _without_other_foot(footfalls: Footfalls, leaning: Sequence[Stride]) -> Footfalls:
+    """Return the strides of a force that the shank confirms and in or before whose swing the plate is free.
+
+    The events of one foot in force and shank are near each other in every stride; where the other foot is on the plate
+    they are not. A shank whose strides do not repeat confirms nothing, and none beyond its own is refuted.
+    """
+    force = footfalls.walk[FORCE]
+    times = [stride.time for stride in leaning]
+    repeats = len(times) >= LEAST_STRIDES and np.std(times) < _REPEATS * np.mean(times)
+
+    def is_alone(stride: Stride) -> bool:
+        if repeats and stride.end > leaning[0].start + _NEAR and stride.start < leaning[-1].end - _NEAR:
+            of = min(leaning, key=lambda each: abs(each.start - stride.start))
+            events = stride.start - of.start, stride.toe_off - of.toe_off, stride.end - of.end
+            if max(map(abs, events)) > _SHIFTED * of.time:
+                return False
+        margin = _END_OF_SWING * (stride.end - stride.toe_off)
+        # Before the strike the last part of the swing counts.
+        swings = (stride.start - 2.0 * margin, stride.start - margin), (stride.toe_off + margin, stride.end - margin)
+        inside = np.any([(force.time > first) & (force.time < last) for first, last in swings], axis=0)
+        return float(np.mean(force.values[inside] > LOADED)) <= _TOUCHED if inside.any() else True
+
+    # A force and a shank that agree in no stride are of two feet, or have a wrong sign, which is told.
+    alone = [stride for stride in footfalls.strides if is_alone(stride)] or footfalls.strides
+    others = (stride for stride in footfalls.strides if stride not in alone)
+    return replace(footfalls, strides=alone, shared=(*footfalls.shared, *others))
 
 
 def _by_contacts(strides: list[Stride], contacts: Sequence[Contact]) -> tuple[list[Stride], str]:

@@ -277,7 +277,8 @@ def _curves_over_strides(
     unusual = [(stride, f"{stride.time:.3g} s long, the others are about {usual}") for stride in odd]
     counts = [(stride, max(lost_in(recorded[name], stride) for name in REQUIRED)) for stride in footfalls.strides]
     lost = [(stride, f"markers or angles lost in {count_of(count, 'frame')}") for stride, count in counts if count]
-    usable = StrideSelection(tuple(kept), (*unusual, *lost), least)
+    shared = [(stride, "vertical_force, not shank_angle, shows another foot in it") for stride in footfalls.shared]
+    usable = StrideSelection(tuple(kept), (*shared, *unusual, *lost), least)
     if len(kept) < least:
         wrong.append(DataError(_too_few(usable, footfalls)))
     if not kept:

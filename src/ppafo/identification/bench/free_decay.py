@@ -347,14 +347,15 @@ class FreeDecayProblem(bench.TimedLaw):
 
 def _panels(decays: Sequence[FreeDecay], model: Floats, slowing: Slowing) -> tuple[Panel, Panel]:
     """Return two panels: angle over time, and acceleration over velocity with the straight line of equation (1)."""
-    angles = []
+    angles = list[Mark]()
     rates = []
     measured = "measured"
     fitted = "fitted"
     fastest = 0.0
     for decay in decays:
-        angles.append(readings_mark(measured, decay.time, decay.angle))
-        angles.append(curve_mark(fitted, decay.time, model[: decay.time.size]))
+        angles.extend(
+            (readings_mark(measured, decay.time, decay.angle), curve_mark(fitted, decay.time, model[: decay.time.size]))
+        )
         model = model[len(decay.sensors) * decay.time.size :]
         velocity, acceleration = smoothed_rates(decay.time, decay.sign * decay.angle)
         inner = slice(smoothing_width(decay.time.size), None, max(1, decay.time.size // 200))
