@@ -3,6 +3,7 @@
 import logging
 import re
 import sys
+import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +21,7 @@ from ppafo.loading import with_overrides
 from ppafo.metrics import METRICS
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
+from ppafo.simulation.profiles import profile_bounds
 
 LAW = """
 from dataclasses import replace
@@ -136,6 +138,7 @@ def test_profiles_and_metrics_are_found_too(install: Install) -> None:
     assert "nothing" not in METRICS
 
 
+STUDY = Path(ppafo.__file__).parent / "studies" / "library" / "pressure-and-area.toml"
 PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "extend.md").read_text(encoding="utf-8")
 OWN_LAW = next(block for block in PAGE.split("```python\n") if "ControllerKind(" in block).partition("```")[0]
 MISTAKES = {
@@ -163,6 +166,93 @@ def test_a_mistake_in_a_law_is_one_line_with_its_file(
     assert main(["simulate", "torque-task-proportional", *sets, "--plugin", str(tmp_path / f"{name}.py")]) == 2
     *_, line = capsys.readouterr().err.splitlines()
     assert re.search(rf"{name}\.py{said}", line)
+    with pytest.raises(ppafo.PpafoError, match=rf"{name}\.py{said}"):
+        ppafo.simulate("torque-task-proportional", texts, plugins=[tmp_path / f"{name}.py"])
+
+
+SWAPPED = """
+from dataclasses import replace
+from ppafo.control.profiles import SINE
+
+def bounds(parameters):
+    lowest, highest = SINE.bounds(parameters)
+    return {returned}
+
+KIND = replace(SINE, name="wave", bounds=bounds)
+"""
+
+
+def test_bounds_of_another_package_are_in_order_and_let_no_profile_leave_the_stops(install: Install) -> None:
+    install("other_waves", SWAPPED.format(returned="highest, lowest"), profiles="wave")
+    wave = {"kind": "wave", "level": "1 N m", "amplitude": "2 N m", "frequency": "1 Hz"}
+    document = dict(load_scenario("torque-task-moving-ankle").origin.content)
+    with pytest.raises(ppafo.KindError, match="must return lowest and highest value, not 3 and -1"):
+        profile_bounds(scenario_from_dict({**document, "reference": wave}).reference)
+    turning = {"kind": "wave", "level": "1.5 rad", "amplitude": "1.5 rad", "frequency": "1 Hz"}
+    with pytest.raises(ScenarioError, match=r"leaves the stops .* rad at 0\.\d+ s"):
+        scenario_from_dict({**document, "motion": {"kind": "prescribed", "profile": turning}})
+
+
+def test_a_metric_of_another_package_with_one_number_for_all_runs_is_refused(install: Install) -> None:
+    text = "from dataclasses import replace\nfrom ppafo.metrics import METRICS\n"
+    install(
+        "other_numbers",
+        text + 'KIND = replace(METRICS["rms_error"], name="mine", read=lambda readings: 1.0)\n',
+        metrics="mine",
+    )
+    document = tomllib.loads(STUDY.read_text(encoding="utf-8"))
+    document["outputs"] = {"metrics": ["mine"]}
+    with pytest.raises(ppafo.KindError, match=r"'mine': .* for each run, an array of shape"):
+        ppafo.sweep(document, overrides=["run.duration=20 ms"])
+
+
+LATER = """
+import math
+from typing import Annotated, NamedTuple
+from ppafo.control.kind import ControllerKind
+from ppafo.model.declaration import EmptyRow, Number, quantities_of
+
+
+class Gains(NamedTuple):
+    first: Annotated[float, Number("", "first gain", 0.0, 0.0, 10.0)]
+    second: Annotated[float, Number("", "second gain", 0.5, 0.0, 10.0)]
+
+
+def update(parameters, state, reference, measurement, period):
+    return {command}, state
+
+
+KIND = ControllerKind("mine", "A law.", "none", quantities_of(Gains){order}, Gains, EmptyRow(), update)
+"""
+
+
+@pytest.mark.parametrize(
+    ("command", "order", "said"),
+    [
+        ("0.1 * math.sqrt(reference - measurement.torque)", "", ""),
+        ("0.1 / parameters.first", "", ""),
+        ("math.sqrt(-1.0 - reference * reference)", "", "math domain error"),
+        ("0.0", "[::-1]", "in the order first, second, its quantities second, first"),
+    ],
+    ids=["root", "divisor", "nowhere", "order"],
+)
+def test_a_law_is_refused_only_where_it_is_defined_nowhere_and_its_numbers_have_one_order(
+    command: str, order: str, said: str, install: Install
+) -> None:
+    install("more_laws", LATER.format(command=command, order=order), controllers="mine")
+    if said:
+        with pytest.raises(ppafo.KindError, match=said):
+            CONTROLLERS["mine"]
+    else:
+        assert CONTROLLERS["mine"].name == "mine"
+
+
+def test_a_command_that_no_valve_has_is_refused_at_its_time(install: Install) -> None:
+    install("wild_laws", LATER.format(command="min(0.5 * abs(reference), 3.0)", order=""), controllers="mine")
+    overrides = ["controller.kind=mine", "reference.level=8 N m", "run.duration=0.5 s"]
+    result = ppafo.simulate("torque-task-proportional", overrides)
+    with pytest.raises(ppafo.KindError, match=r"^controller 'mine': command .* at t = 0\.\d+ s: must be -1 to 1$"):
+        result.recording  # noqa: B018 - it is made when it is asked for
 
 
 def test_every_kind_of_the_package_passes_the_check_of_others() -> None:

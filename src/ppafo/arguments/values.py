@@ -25,10 +25,11 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple, ParamSpec, TypeVar
 
 from ppafo.arguments.reading import ANY, MAXIMUM_DIGITS, NUMBER, NumberRange, NumberWithUnit, Word, task
-from ppafo.errors import ArgumentError, PpafoError
+from ppafo.errors import ArgumentError, KindError, PpafoError
+from ppafo.kinds import fault_of_user
 from ppafo.plugins import name_plugins
 from ppafo.units import SI, carried
-from ppafo.wording import nearest_name, read_by, reader
+from ppafo.wording import nearest_name
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -53,22 +54,23 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
         # NumPy's usual handling of errors, whatever the host program has set: an underflow is 0, and nothing to raise.
         numpy = sys.modules.get("numpy")
         usual = contextlib.nullcontext() if numpy is None else numpy.errstate(all="warn", under="ignore")
-        asking = reader()
-        with usual, read_by("function") if asking == "caller" else contextlib.nullcontext():
+        with usual:
             try:
                 name_plugins(values.get("plugins", ()))
                 return function(**values)  # type: ignore[call-arg]  # names and types are those of the signature
-            except PpafoError as error:
-                if asking == "caller" and error.argument in values:
-                    error.args = (f"{error.argument}: {error}",)
+            except PpafoError:
                 raise
             except OSError as error:
                 # Of a name too long to be asked whether there is such a file.
-                if error.errno != errno.ENAMETOOLONG or asking == "function":
+                if error.errno != errno.ENAMETOOLONG:
                     raise
                 longest = max(Path(str(error.filename)).parts, key=len)
                 given = next((f"{name}: " for name, value in values.items() if longest in str(value)), "")
                 raise ArgumentError(f"{given}{shown(longest)} is too long for the name of a file") from error
+            except Exception as error:  # what a kind of another package raises while it runs is anybody's guess
+                if line := fault_of_user(error):
+                    raise KindError(line) from error
+                raise
 
     return call
 

@@ -25,7 +25,7 @@ from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import ArgumentError, PpafoError
 from ppafo.kinds import kind_at
 from ppafo.plugins import name_modules_in, name_plugins
-from ppafo.wording import nearest_name, read_by
+from ppafo.wording import nearest_name, on_command_line
 
 if TYPE_CHECKING:
     from importlib.abc import InspectLoader
@@ -253,11 +253,11 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     if OUT not in parameters:
         folder = parsed.out
         if folder is None and command.default_folder:
-            with read_by("command line"):
+            with on_command_line():
                 folder = kind_at(command.default_folder)(values)
         # Before the verb runs: a folder that is refused must not cost a long run.
         output.check_output(folder, name)
-    with output.progress_line() as progress, read_by("command line"):
+    with output.progress_line() as progress, on_command_line():
         answer = verb(**values, **({PROGRESS: progress} if PROGRESS in parameters else {}))
     return output.deliver(answer, parsed.json, folder, name, has_written=OUT in parameters)
 

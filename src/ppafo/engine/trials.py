@@ -7,12 +7,14 @@ numbers of that device (``parameters.natural_laws``).
 
 import contextlib
 import inspect
+from itertools import product
 from types import FunctionType
 from typing import Any
 
 from ppafo.control.kind import ControllerKind
 from ppafo.engine.rows import is_row, leaf_paths, leaves, rebuilt
 from ppafo.errors import KindError, UnitError
+from ppafo.model.declaration import quantities_of
 from ppafo.model.effects.kind import Effect, effect_problem
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
@@ -20,6 +22,8 @@ from ppafo.units import base_value
 from ppafo.wording import place
 
 _MEASUREMENT = GaitMeasurement(1.4, 3.0e5, 2.0e5, 0.7, 100.0, 50.0)
+_REFERENCES = (1.0, 4.0, -3.0, 2.5e5)
+"""References at which a law is tried: it must be defined at one of them, as a root is not at all."""
 
 
 def check_kind(kind: Any) -> None:
@@ -41,6 +45,10 @@ def check_kind(kind: Any) -> None:
         if not is_row(settings) or len(leaf_paths(settings, "")) != len(kind.quantities):
             declaration = "name: Annotated[float, Number(unit, summary, default, minimum, maximum)]"
             raise ValueError(f"must be a NamedTuple with each of its numbers declared, as {declaration}")
+        fields = [item.name for item in quantities_of(settings)]
+        named = [item.name for item in kind.quantities]
+        if named != fields and sorted(named) == sorted(fields):
+            raise ValueError(f"its fields are in the order {', '.join(fields)}, its quantities {', '.join(named)}")
         if isinstance(kind, Effect) and (problem := effect_problem(kind)):
             raise ValueError(problem)
         defaults = [item.default for item in kind.quantities]
@@ -50,7 +58,7 @@ def check_kind(kind: Any) -> None:
             at_fault = kind.update
             # A misspelt name is refused, with the nearest one, where the law is compiled.
             with contextlib.suppress(AttributeError, NameError):
-                _check_law(kind, rebuilt(settings, map(float, defaults)))
+                _check_law(kind, settings)
     except (ArithmeticError, AttributeError, TypeError, ValueError, UnitError) as error:
         where = ""
         with contextlib.suppress(OSError, TypeError):  # it is no class, or in no file
@@ -58,9 +66,22 @@ def check_kind(kind: Any) -> None:
         raise KindError(f"{where}{error}") from error
 
 
-def _check_law(kind: ControllerKind, parameters: Any) -> None:
-    """Check what a law returns for one sample. Raises ValueError unless it is a command and the next state."""
-    command, after = kind.update(parameters, kind.initial, 1.0, _MEASUREMENT, 1.0e-3)
+def _check_law(kind: ControllerKind, settings: type) -> None:
+    """Check what a law returns for one sample. Raises ValueError unless it is a command and the next state.
+
+    A default of 0 may be no number to divide by, so that the law is tried with numbers near 1 too.
+    """
+    ones = [min(max(1.0, item.minimum), item.maximum) for item in kind.quantities]
+    defaults = [item.default or 0.0 for item in kind.quantities]
+    for numbers, reference in product((defaults, ones), _REFERENCES):
+        parameters = rebuilt(settings, map(float, numbers))
+        try:
+            command, after = kind.update(parameters, kind.initial, reference, _MEASUREMENT, 1.0e-3)
+            break
+        except (ArithmeticError, ValueError) as error:
+            undefined = error
+    else:
+        raise undefined
     is_state = type(after) is type(kind.initial) and all(isinstance(number, float) for number in leaves(after))
     if not is_state or not isinstance(command, float) or not -1.0 <= command <= VENT:
         raise ValueError(

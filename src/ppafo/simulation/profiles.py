@@ -10,8 +10,9 @@ from ppafo.control.catalog import PROFILES
 from ppafo.control.profiles import disordered_knot
 from ppafo.engine.in_python import over_samples
 from ppafo.engine.rows import rebuilt
+from ppafo.errors import KindError
 from ppafo.model.catalog import VALVES
-from ppafo.model.columns import Problem, at, larger, over_runs
+from ppafo.model.columns import Problem, at, first, larger, over_runs
 from ppafo.model.controlled import ANGLE, TORQUE, ControlledQuantity, Ends
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declared import kind_at
@@ -50,6 +51,11 @@ def of_profile(function: Callable[[Any], Any], choice: ProfileChoice) -> Any:
 def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
     """Lowest and highest value of a profile [N m or rad, as its levels]; arrays (runs,) if its settings are arrays."""
     lowest, highest = of_profile(PROFILES[choice.kind].bounds, choice)
+    if not np.all(lowest <= highest):
+        found = f"{first(lowest):.6g} and {first(highest):.6g}"
+        raise KindError(
+            f"profile '{choice.kind}': bounds(parameters) must return lowest and highest value, not {found}"
+        )
     return lowest, highest
 
 

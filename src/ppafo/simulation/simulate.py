@@ -13,10 +13,11 @@ from ppafo.documents.json_text import plain
 from ppafo.engine.compilers import Effort
 from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together, state_row_numbers
-from ppafo.errors import SimulationError
+from ppafo.errors import KindError, SimulationError
+from ppafo.model.valves.kind import VENT
 from ppafo.signals.recording import Recording
 from ppafo.simulation.at_hand import RecordedResult, in_own_units
-from ppafo.simulation.motion_kind import Measured
+from ppafo.simulation.motion_kind import WALK, Measured
 from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario, scenario_document
@@ -244,10 +245,21 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
         from ppafo.metrics.metric import Metrics
 
         rows = rows_by_path(run, outcome.record[: times.size])
+        check_commands(scenario, times, rows["result.command"])
         recording, metrics = scenario.motion.motion_kind.measured(scenario, run, times, rows)
         return recording, Metrics(metrics)
 
     return Result(scenario, status, versions, engine, DeferredResult(measured))
+
+
+def check_commands(scenario: Scenario, times: Floats, commands: Floats) -> None:
+    """Raise KindError for a command [-] that is none: a valve opens by 1 at most, and says nothing of more."""
+    is_vent = (commands == VENT) & (scenario.motion.motion_kind.layout == WALK)
+    is_command = (np.abs(commands) <= 1.0) | is_vent
+    if not is_command.all():
+        sample = int(np.argmin(is_command))
+        at_fault = f"controller '{scenario.controller.kind}': command {commands[sample]:.6g}"
+        raise KindError(f"{at_fault} at t = {times[sample]:.6g} s: must be -1 to 1")
 
 
 def rows_by_path(run: Run, record: Floats) -> dict[str, Floats]:

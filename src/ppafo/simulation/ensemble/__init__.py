@@ -13,7 +13,7 @@ from ppafo.engine.compilers import Effort
 from ppafo.engine.lanes import Batch, BatchResult, Count, Floats, load_programs, run_blocks
 from ppafo.engine.rows import group_of, row_numbers
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Members
-from ppafo.errors import ScenarioError
+from ppafo.errors import KindError, ScenarioError
 from ppafo.metrics import METRICS, MetricKind, has_channels, metric_kind
 from ppafo.metrics.gas import WITH_ENERGY_BALANCE
 from ppafo.metrics.metric import Readings
@@ -147,7 +147,14 @@ class _MeteredBatch:
         meters = {kind.name: group_of(group, groups, states) for group, kind in program.meter_groups.items()}
         readings = Readings(meters=meters, course=course, interval=interval, samples=self.samples, traces=traces)
         with np.errstate(all="ignore"):
-            return {name: np.asarray(self.metrics[name].read(readings)) for name in names}
+            values = {name: np.asarray(self.metrics[name].read(readings)) for name in names}
+        for name, numbers in values.items():
+            if numbers.shape != interval.shape:
+                raise KindError(
+                    f"metric '{name}': read(readings) must return a number for each run, an array of shape "
+                    f"{interval.shape}, not {numbers.shape}"
+                )
+        return values
 
 
 def lacking(scenario: Scenario, kind: MetricKind) -> str:
