@@ -17,7 +17,7 @@ from functools import lru_cache, partial
 from types import CodeType, FunctionType
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from ppafo.errors import Faults, KindError
+from ppafo.errors import Faults, KindError, PpafoError
 from ppafo.plugins import OBJECT, is_working_folder, named_kinds, object_of, without_working_folder
 from ppafo.wording import one_line, place
 
@@ -237,7 +237,8 @@ def fault_of_user(error: Exception) -> str:
     kinds = _kinds_by_code()
     steps = traceback.extract_tb(error.__traceback__)
     frames = [step for step in steps if step.filename in {code.co_filename for code in kinds}]
-    if not kinds:
+    # What this package says of itself is no such error.
+    if not kinds or isinstance(error, PpafoError):
         return ""
     passed = {frame.name for frame in frames}
     codes = [code for code in kinds if code.co_name in passed] or list(kinds)

@@ -1,7 +1,6 @@
 """Kinds of other packages: found by entry point or by module and object, refused in one line."""
 
 import logging
-import re
 import sys
 import tomllib
 from collections.abc import Callable, Iterator
@@ -14,6 +13,7 @@ import ppafo
 from ppafo import plugins
 from ppafo.cli.main import main
 from ppafo.control.catalog import CONTROLLERS, PROFILES
+from ppafo.control.profiles import SINE
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.trials import check_kind
 from ppafo.errors import ScenarioError
@@ -75,13 +75,12 @@ def test_a_broken_package_is_one_line_and_stops_no_other(install: Install, caplo
         "controller 'broken' of package 'broken_laws' cannot be loaded: ModuleNotFoundError: No module named "
         "'nowhere_to_be_found'",
     )
-    assert [record.getMessage() for record in caplog.records] == [f"ppafo: {line}" for line in problems]
+    assert len(caplog.records) == len(problems)
     assert "mine" in CONTROLLERS
     document = dict(load_scenario("torque-task-proportional").origin.content)
     document["controller"] = {"kind": "broken"}
-    with pytest.raises(ScenarioError) as caught:
+    with pytest.raises(ScenarioError, match="controller 'broken' of package 'broken_laws' cannot be loaded"):
         scenario_from_dict(document)
-    assert str(caught.value) == f"scenario 'torque-task-proportional': controller.kind: {problems[1]}"
 
 
 def test_a_name_of_one_of_our_own_is_refused_by_name(install: Install) -> None:
@@ -125,17 +124,10 @@ def test_another_law_forgets_a_number_of_the_same_name_in_another_unit(monkeypat
         )
 
 
-def test_profiles_and_metrics_are_found_too(install: Install) -> None:
-    profile = "from dataclasses import replace\nfrom ppafo.control.profiles import SINE\n"
-    install("other_profiles", profile + 'KIND = replace(SINE, name="wave")\n', profiles="wave")
+def test_metrics_are_found_too(install: Install) -> None:
     metric = "from dataclasses import replace\nfrom ppafo.metrics import METRICS\n"
     install("other_metrics", metric + 'KIND = replace(METRICS["rms_error"], name="mine")\n', metrics="mine")
-    document = dict(load_scenario("torque-task-proportional").origin.content)
-    document["assumed"] = {}
-    document["reference"] = {"kind": "wave", "level": "1 N m", "amplitude": "1 N m", "frequency": "1 Hz"}
-    assert scenario_from_dict(document).reference.kind == "wave"
     assert "mine" in METRICS
-    assert "nothing" not in METRICS
 
 
 STUDY = Path(ppafo.__file__).parent / "studies" / "library" / "pressure-and-area.toml"
@@ -164,8 +156,7 @@ def test_a_mistake_in_a_law_is_one_line_with_its_file(
     texts = [f"controller.kind={name}:KIND", "controller.band=0.2 N m", "run.duration=10 ms"]
     sets = [word for text in texts for word in ("--set", text)]
     assert main(["simulate", "torque-task-proportional", *sets, "--plugin", str(tmp_path / f"{name}.py")]) == 2
-    *_, line = capsys.readouterr().err.splitlines()
-    assert re.search(rf"{name}\.py{said}", line)
+    assert f"{name}.py:" in capsys.readouterr().err.splitlines()[-1]
     with pytest.raises(ppafo.PpafoError, match=rf"{name}\.py{said}"):
         ppafo.simulate("torque-task-proportional", texts, plugins=[tmp_path / f"{name}.py"])
 
@@ -188,70 +179,42 @@ def test_bounds_of_another_package_are_in_order_and_let_no_profile_leave_the_sto
     document = dict(load_scenario("torque-task-moving-ankle").origin.content)
     with pytest.raises(ppafo.KindError, match="must return lowest and highest value, not 3 and -1"):
         profile_bounds(scenario_from_dict({**document, "reference": wave}).reference)
-    turning = {"kind": "wave", "level": "1.5 rad", "amplitude": "1.5 rad", "frequency": "1 Hz"}
+    turning = {**wave, "level": "1.5 rad", "amplitude": "1.5 rad"}
     with pytest.raises(ScenarioError, match=r"leaves the stops .* rad at 0\.\d+ s"):
         scenario_from_dict({**document, "motion": {"kind": "prescribed", "profile": turning}})
 
 
 def test_a_metric_of_another_package_with_one_number_for_all_runs_is_refused(install: Install) -> None:
-    text = "from dataclasses import replace\nfrom ppafo.metrics import METRICS\n"
-    install(
-        "other_numbers",
-        text + 'KIND = replace(METRICS["rms_error"], name="mine", read=lambda readings: 1.0)\n',
-        metrics="mine",
-    )
+    text = """from dataclasses import replace
+from ppafo.metrics import METRICS
+KIND = replace(METRICS["rms_error"], name="mine", read=lambda readings: 1.0)
+"""
+    install("other_numbers", text, metrics="mine")
     document = tomllib.loads(STUDY.read_text(encoding="utf-8"))
     document["outputs"] = {"metrics": ["mine"]}
     with pytest.raises(ppafo.KindError, match=r"'mine': .* for each run, an array of shape"):
         ppafo.sweep(document, overrides=["run.duration=20 ms"])
 
 
-LATER = """
-import math
-from typing import Annotated, NamedTuple
-from ppafo.control.kind import ControllerKind
-from ppafo.model.declaration import EmptyRow, Number, quantities_of
+def test_a_law_need_not_be_defined_at_every_number(install: Install) -> None:
+    # Once of no use at 1, once at its default.
+    for name, divisor in (("pole", "(reference - 1.0)"), ("unset", "parameters.band")):
+        text = OWN_LAW.replace("    error = ", f"    error = 1.0 / {divisor} + ").replace("0.2, 0.0", "0.0, 0.0")
+        install(f"law_{name}", text.replace("hysteresis", name), controllers=name)
+        assert CONTROLLERS[name].name == name
 
 
-class Gains(NamedTuple):
-    first: Annotated[float, Number("", "first gain", 0.0, 0.0, 10.0)]
-    second: Annotated[float, Number("", "second gain", 0.5, 0.0, 10.0)]
-
-
-def update(parameters, state, reference, measurement, period):
-    return {command}, state
-
-
-KIND = ControllerKind("mine", "A law.", "none", quantities_of(Gains){order}, Gains, EmptyRow(), update)
-"""
-
-
-@pytest.mark.parametrize(
-    ("command", "order", "said"),
-    [
-        ("0.1 * math.sqrt(reference - measurement.torque)", "", ""),
-        ("0.1 / parameters.first", "", ""),
-        ("math.sqrt(-1.0 - reference * reference)", "", "math domain error"),
-        ("0.0", "[::-1]", "in the order first, second, its quantities second, first"),
-    ],
-    ids=["root", "divisor", "nowhere", "order"],
-)
-def test_a_law_is_refused_only_where_it_is_defined_nowhere_and_its_numbers_have_one_order(
-    command: str, order: str, said: str, install: Install
-) -> None:
-    install("more_laws", LATER.format(command=command, order=order), controllers="mine")
-    if said:
-        with pytest.raises(ppafo.KindError, match=said):
-            CONTROLLERS["mine"]
-    else:
-        assert CONTROLLERS["mine"].name == "mine"
+def test_the_numbers_of_a_kind_have_the_order_of_its_fields() -> None:
+    with pytest.raises(ppafo.KindError, match="its fields are in the order level, amplitude"):
+        check_kind(replace(SINE, quantities=SINE.quantities[::-1]))
 
 
 def test_a_command_that_no_valve_has_is_refused_at_its_time(install: Install) -> None:
-    install("wild_laws", LATER.format(command="min(0.5 * abs(reference), 3.0)", order=""), controllers="mine")
-    overrides = ["controller.kind=mine", "reference.level=8 N m", "run.duration=0.5 s"]
+    text = OWN_LAW.replace("return command, ", "return min(0.5 * abs(reference), 3.0), ")
+    install("wild_law", text.replace("hysteresis", "wild"), controllers="wild")
+    overrides = ["controller.kind=wild", "reference.level=8 N m", "run.duration=0.5 s"]
     result = ppafo.simulate("torque-task-proportional", overrides)
-    with pytest.raises(ppafo.KindError, match=r"^controller 'mine': command .* at t = 0\.\d+ s: must be -1 to 1$"):
+    with pytest.raises(ppafo.KindError, match=r"^controller 'wild': command .* at t = 0\.\d+ s: must be -1 to 1$"):
         result.recording  # noqa: B018 - it is made when it is asked for
 
 

@@ -58,8 +58,6 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
             try:
                 name_plugins(values.get("plugins", ()))
                 return function(**values)  # type: ignore[call-arg]  # names and types are those of the signature
-            except PpafoError:
-                raise
             except OSError as error:
                 # Of a name too long to be asked whether there is such a file.
                 if error.errno != errno.ENAMETOOLONG:

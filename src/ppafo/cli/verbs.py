@@ -26,9 +26,9 @@ from ppafo.arguments import (
     Whole,
     Word,
 )
+from ppafo.cli.output import CommandOutput, blame_out_option, check_new_file, export, listing
 
 if TYPE_CHECKING:
-    from ppafo.cli.output import CommandOutput
     from ppafo.gait.finding import GaitFound
     from ppafo.report.finding import Finding
 
@@ -47,7 +47,6 @@ def gait_list() -> CommandOutput:
     >>> print(gait_list().text)
     falisse2019-subject1  Healthy adult, 62 kg, overground at 1.33 m/s
     """
-    from ppafo.cli.output import listing
     from ppafo.gait import list_gaits, load_gait
 
     return listing("gait", [{"name": name, "title": load_gait(name).title} for name in list_gaits()])
@@ -145,7 +144,6 @@ def gait_record(gait: Gait, *, strides: Count = 10, out: File) -> CommandOutput:
     >>> print(gait_record("falisse2019-subject1", strides=2, out=Path("strides.csv")).text)
     written: strides.csv (417 samples, synthetic)
     """
-    from ppafo.cli.output import CommandOutput, check_new_file
     from ppafo.errors import DataError
     from ppafo.gait import load_gait, walk_recording
     from ppafo.storage import write_csv
@@ -170,7 +168,6 @@ def export_c(
     written: library (CMakeLists.txt, LICENSE, Makefile, README.md, check.c, main.c, step_response.c, step_response.h,
     expected.csv); next: make -C library check
     """
-    from ppafo.cli.output import export
     from ppafo.exports.c_library import c_library
     from ppafo.exports.c_library.plant import plant_library
     from ppafo.loading import load_scenario
@@ -198,7 +195,6 @@ def export_fmu(
     >>> print(export_fmu("step-response", out=Path("step.fmu")).text.splitlines()[0])
     written: step.fmu; next: fmpy simulate step.fmu --output-file step.csv
     """
-    from ppafo.cli.output import CommandOutput, check_new_file, export
     from ppafo.exports.fmu.interface import closed_loop, plant_alone
     from ppafo.exports.fmu.platforms import host_platform
     from ppafo.exports.fmu.unit import functional_unit
@@ -249,7 +245,6 @@ def sets_list() -> CommandOutput:
     ppafo2011          Portable powered ankle-foot orthosis, completed
     ppafo2011-printed  Portable powered ankle-foot orthosis, exactly as reported
     """
-    from ppafo.cli.output import listing
     from ppafo.parameters import list_sets, load_parameter_set
 
     sets = [load_parameter_set(name) for name in list_sets()]
@@ -316,7 +311,6 @@ def rig_simulate(
     201 samples of command, mass_flow, upstream_pressure, downstream_pressure
     written: rig (valve-map.csv, rig.json)
     """
-    from ppafo.cli.output import CommandOutput, blame_out_option
     from ppafo.rig.experiments import NOTICE, check_rig_folder, record, write_rig_recording
 
     # A folder that cannot be used is refused before anything runs.
@@ -336,7 +330,6 @@ def rig_simulate(
 
 def list_rig() -> CommandOutput:
     """List experiments and presets of the simulated bench with descriptions."""
-    from ppafo.cli.output import CommandOutput
     from ppafo.rig.experiments import EXPERIMENTS
     from ppafo.rig.preset import list_presets, load_preset
 

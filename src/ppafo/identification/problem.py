@@ -162,12 +162,10 @@ def load_problem(path: str | Path) -> ProblemFile:
     Raises IdentificationError for an invalid file, and for recordings that are not there.
     """
     source = _FILE.load(path)
-    file = source.label
-    folder = source.folder
     problem = checked_record(ProblemFile, source)
     # Each may be left out, which the layout allows, but not both.
     if not problem.procedure and problem.trajectory is None:
-        raise IdentificationError(f"{file}: has neither a [[procedure]] nor a [trajectory]")
+        raise IdentificationError(f"{source.label}: has neither a [[procedure]] nor a [trajectory]")
     maps = {}
     recordings = dict[str, str]()
     for number, item in enumerate(problem.procedure, start=1):
@@ -182,12 +180,12 @@ def load_problem(path: str | Path) -> ProblemFile:
         if name is not None and name not in problem.columns
     }
     for key, name in recordings.items():
-        if not (folder / name).is_file():
-            wrong = "is a folder" if (folder / name).is_dir() else "no such file"
-            near = nearest_name(name, [each.name for each in folder.iterdir()])
+        if not (source.folder / name).is_file():
+            wrong = "is a folder" if (source.folder / name).is_dir() else "no such file"
+            near = nearest_name(name, [each.name for each in source.folder.iterdir()])
             faults[key] = f"{key} = {quote(name)}: {wrong}{near}"
     if faults:
-        refuse(faults, file, IdentificationError, partial(line_of, decoded(source.content)))
+        refuse(faults, source.label, IdentificationError, partial(line_of, decoded(source.content)))
     return problem
 
 

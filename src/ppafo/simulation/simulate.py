@@ -258,8 +258,10 @@ def check_commands(scenario: Scenario, times: Floats, commands: Floats) -> None:
     is_command = (np.abs(commands) <= 1.0) | is_vent
     if not is_command.all():
         sample = int(np.argmin(is_command))
-        at_fault = f"controller '{scenario.controller.kind}': command {commands[sample]:.6g}"
-        raise KindError(f"{at_fault} at t = {times[sample]:.6g} s: must be -1 to 1")
+        raise KindError(
+            f"controller '{scenario.controller.kind}': command {commands[sample]:.6g} at t = {times[sample]:.6g} s: "
+            "must be -1 to 1"
+        )
 
 
 def rows_by_path(run: Run, record: Floats) -> dict[str, Floats]:

@@ -25,7 +25,7 @@ from ppafo.errors import DataError, Faults, UnitError, refused_as
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.signals.recording import BETWEEN, PLAIN_NUMBER, TIME, TIME_UNIT, Between, Floats
 from ppafo.storage.files import read_bytes, text_of, write_file
-from ppafo.units import LEVEL
+from ppafo.units import LEVEL, check_unit, to_si
 from ppafo.wording import LONGEST_SHOWN, finite_number, first_twice, nearest_name, one_line
 
 _HEADER = re.compile(r"\s*(\w+)\s*\[\s*([^\[\]]+?)\s*\]\s*(\w*)\s*", re.ASCII)
@@ -56,8 +56,6 @@ class HeaderColumn:
 
         Raises UnitError for a unit that does not fit.
         """
-        from ppafo.units import check_unit, to_si
-
         known, wanted = (_SPELT.get(unit, unit) for unit in (self.unit, self.si_unit))
         if self.unit != self.si_unit:
             values = np.array([to_si(value, known, wanted, atmosphere) for value in values.tolist()])

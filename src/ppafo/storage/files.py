@@ -75,19 +75,16 @@ def is_address(path: str | Path) -> bool:
 def write_file(path: str | Path, content: bytes) -> Path:
     """Write a file, replacing an earlier one and creating missing folders. Returns the path."""
     target = Path(path)
-    with _write_errors(target), _make_folder(target.parent):
-        aside = _sibling(target, "writing")
-        try:
-            aside.write_bytes(content)
-            aside.replace(target)
-        finally:
-            aside.unlink(missing_ok=True)
+    add_files(target.parent, {target.name: content}, target)
     return target
 
 
-def add_files(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Write files into a folder, replacing files of equal names; all are written before the first is renamed."""
-    with _write_errors(folder), _make_folder(folder):
+def add_files(folder: Path, contents: Mapping[str, bytes], named: Path | None = None) -> None:
+    """Write files into a folder, replacing files of equal names; all are written before the first is renamed.
+
+    Errors name the folder, or the path ``named``.
+    """
+    with _write_errors(named or folder), _make_folder(folder):
         _check_no_folder(folder, contents)
         aside = _sibling(folder / "files", "writing")
         try:

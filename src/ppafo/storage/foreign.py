@@ -36,6 +36,8 @@ from ppafo.storage.comma_separated import (
 )
 from ppafo.storage.files import read_bytes, text_of
 from ppafo.storage.matlab import MATLAB_SUFFIX, read_mapped_matlab, read_matlab
+from ppafo.units import parse_quantity, split_number
+from ppafo.units.spelling import flow_of, is_volume_flow, molar_mass_in, read_unit
 from ppafo.wording import LONGEST_SHOWN, finite_number, known_names, nearest_name, one_line
 
 _SHORTEST = 1e-12
@@ -330,8 +332,6 @@ def _channel(name: str, mapped: MappedChannel, table: MappedTable, atmosphere: f
 
     ``atmosphere`` [Pa absolute] and ``gas`` (empty if unknown) complete gauge pressures and volume flows.
     """
-    from ppafo.units import split_number
-
     if mapped.constant is not None:
         with refused_as(DataError, f"channels.{name}.constant = {mapped.constant!r}", UnitError):
             value, unit = split_number(mapped.constant)
@@ -353,8 +353,6 @@ def _channel(name: str, mapped: MappedChannel, table: MappedTable, atmosphere: f
 
 def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
     """Return the unit of a channel; a volume flow measured as mass flow gets its reference condition and gas."""
-    from ppafo.units.spelling import flow_of, is_volume_flow, molar_mass_in, read_unit
-
     is_flow = HeaderColumn(name, unit).si_unit == _MASS_FLOW and unit not in ("", PLAIN_NUMBER) and is_volume_flow(unit)
     if not is_flow:
         if mapped.at is not None or mapped.gas is not None:
@@ -374,8 +372,6 @@ def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
 def _time(mapped: MappedChannel, table: MappedTable, atmosphere: float) -> Floats:
     """Return the time [s] of the rows: from a rate, from times of day, or from numbers with a unit."""
     if mapped.rate is not None:
-        from ppafo.units import parse_quantity
-
         with refused_as(DataError, f"channels.{TIME}.rate = {mapped.rate!r}", UnitError):
             rate = parse_quantity(mapped.rate, "1/s")
             if rate <= 0.0:
@@ -403,8 +399,6 @@ def _with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
     motion is too slow. Raises DataError for a channel that is absent or never moves, and for an invalid threshold or
     window.
     """
-    from ppafo.units import parse_quantity
-
     with refused_as(DataError, f"direction.of = {wanted.of!r}", DataError):
         unit = recording.unit(wanted.of)
     rate_unit = "1/s" if unit == PLAIN_NUMBER else f"{unit.removesuffix('_d')}/s"

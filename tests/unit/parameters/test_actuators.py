@@ -86,14 +86,11 @@ def test_a_curve_is_a_cubic_where_the_volume_is_one(angles: int) -> None:
             ("angle [deg],pressure [kPa],volume_1 [mL]", "1,2,3"),
             "column 'pressure' must be in a gauge unit such as kPa_g",
         ),
-        (("angle [kg],pressure [kPa_g],volume_1 [mL]", "1,2,3"), "column 'angle'"),
         (("angle [deg],angle [deg],volume_1 [mL]", "1,2,3"), "the column 'angle' occurs twice"),
         ((HEADER, "1,2"), "line 2: has 2 values, the header has 3"),
         ((HEADER, "1,2,nan"), "line 2: volume_1 = 'nan' is not a finite number"),
-        ((HEADER, "1,2,\uff13"), "line 2: volume_1 = '\uff13' is not a finite number"),
         ((HEADER, *GOOD, "100,90,1e9"), "line 8: volume_1 = 1e+09 mL exceeds"),
         ((HEADER, *GOOD[:-1]), "there is no line for 100 deg and 50 kPa_g"),
-        ((HEADER.replace("kPa_g", "psi_g"), *GOOD[:-1]), "there is no line for 100 deg and 50 psi_g"),
         ((HEADER, *GOOD, GOOD[0]), "has more than one line for 20 deg and 0 kPa_g"),
         (
             (HEADER, *(line.replace(",0,", ",10,") for line in GOOD)),
@@ -101,10 +98,6 @@ def test_a_curve_is_a_cubic_where_the_volume_is_one(angles: int) -> None:
         ),
         ((HEADER.replace(",", ";"), *GOOD), "columns must be separated by commas"),
         ((HEADER, *GOOD[:2]), "has one angle only"),
-        (
-            (HEADER, *(line.replace(",0,", ",-1,") for line in GOOD)),
-            "has no volumes of the vented actuator; add lines at 0 kPa_g",
-        ),
         ((HEADER, *(line.replace(",50,", ",-150,") for line in GOOD)), "pressure = -150 kPa_g is below a perfect vac"),
         (
             (HEADER, *GOOD[:-1], "100,50,140"),

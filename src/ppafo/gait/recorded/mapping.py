@@ -217,7 +217,6 @@ def load_map(path: str | Path) -> GaitMap:
     """Load a gait map from a TOML file; raises DataError if it cannot be used."""
     source = FILE.load(path)
     loaded = checked_record(GaitMap, source)
-    file = source.label
     wrong = []
     shank = loaded.shank_angle
     ankle = loaded.ankle_angle
@@ -233,7 +232,7 @@ def load_map(path: str | Path) -> GaitMap:
         wrong.append("knee: thigh_length and thigh_unit are given without thigh; omit them or give thigh")
     if not loaded.named and loaded.time is None:
         wrong.append("the gait map has no curve, such as [ankle_angle]")
-    Faults([DataError(f"{file}: {fault}") for fault in wrong]).raise_all()
+    Faults([DataError(f"{source.label}: {fault}") for fault in wrong]).raise_all()
     return loaded
 
 

@@ -66,13 +66,12 @@ def read_publication(name_or_path: str | Path) -> tuple[PublicationFile, str]:
     """Read a publication by name or file; also return the file label. Raises ScenarioError if invalid."""
     source = FILE.load(name_or_path)
     read = checked_record(PublicationFile, source)
-    file = source.label
     twice = first_twice(entry.id for entry in read.claims)
     if twice is not None:
-        raise ScenarioError(f"{file}: claims: '{twice}' appears twice")
+        raise ScenarioError(f"{source.label}: claims: '{twice}' appears twice")
     # Rules between fields, which the declaration of one field cannot state.
     for entry in read.claims:
-        where = f"{file}: claims.{entry.id}"
+        where = f"{source.label}: claims.{entry.id}"
         if entry.published is None and not entry.words and not entry.own:
             raise ScenarioError(
                 f"{where}: give one published result: 'published' with its 'unit', or 'words', or 'own' (a calculation)"
@@ -81,7 +80,7 @@ def read_publication(name_or_path: str | Path) -> tuple[PublicationFile, str]:
         if limit is None and not entry.not_testable:
             name = "at_least" if entry.direction == "more" else "at_most"
             raise ScenarioError(f"{where}: direction = '{entry.direction}' also needs {name}")
-    return read, file
+    return read, source.label
 
 
 @cache
