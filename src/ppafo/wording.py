@@ -138,6 +138,13 @@ def known_names(name: str, known: Iterable[str]) -> str:
     return f"{nearest_name(name, names)}; available: {', '.join(names) or 'none'}"
 
 
+def check_known(name: str, known: Iterable[str], error: type[Exception], said: str) -> None:
+    """Raise an ``error`` for an unknown name: what is ``said`` of it, the nearest known name, and all known names."""
+    names = list(known)
+    if name not in names:
+        raise error(f"{said}{known_names(name, names)}")
+
+
 def _without_zeros(name: str) -> str:
     return re.sub(r"(?<!\d)0+(?=\d)", "", name)
 

@@ -40,7 +40,7 @@ from ppafo.study.store import (
 )
 from ppafo.units import from_si
 from ppafo.units.shown import in_units, quantity_of_unit
-from ppafo.wording import known_names
+from ppafo.wording import check_known
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
@@ -116,8 +116,7 @@ class StudyResults:
         known = next(self.chunks()).column_names
         traces = {trace_column(name) for name in CHANNELS}
         for name in columns or ():
-            if name not in known:
-                raise StudyError(f"the study has no column '{name}'{known_names(name, known)}")
+            check_known(name, known, StudyError, f"the study has no column '{name}'")
         columns = columns or [name for name in known if name not in traces]
         return joined([as_numpy(part) for part in self.chunks(columns)])
 
@@ -133,8 +132,7 @@ class StudyResults:
         schema = next(self.chunks(list(frame))).schema
         shown = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in schema}
         for name, unit in (units or {}).items():
-            if name not in shown:
-                raise StudyError(f"the table has no column '{name}'{known_names(name, shown)}")
+            check_known(name, shown, StudyError, f"the table has no column '{name}'")
             with refused_as(UnitError, f"column '{name}' in '{unit}'", UnitError):
                 # Units are affine, so that two values decide all.
                 zero, one = (from_si(number, unit, shown[name]) for number in (0.0, 1.0))
@@ -156,8 +154,7 @@ class StudyResults:
         """Return a stored channel of all runs, shape (runs, samples), nan for failed runs and after a fall."""
         outputs = self.document["study"]["outputs"]
         stored = list(dict.fromkeys([*outputs.get("trajectories", ()), *outputs.get("bands", ())]))
-        if channel not in stored:
-            raise StudyError(f"the study stores no trajectories of '{channel}'{known_names(channel, stored)}")
+        check_known(channel, stored, StudyError, f"the study stores no trajectories of '{channel}'")
         return self._matrix(channel)
 
     def bands(self) -> ask.Rows:

@@ -9,7 +9,7 @@ from ppafo.arguments import Name
 from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, CommandOutput
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError, SimulationError
-from ppafo.wording import known_names
+from ppafo.wording import check_known
 
 FORMATS: dict[str, str] = {
     "parameters": "ppafo.parameters.loading",
@@ -61,8 +61,7 @@ def doctor(
     if len(options) > 1:
         raise DataError(f"{options[1]}: not allowed with {options[0]}")
     if schema is not None:
-        if schema not in FORMATS:
-            raise DataError(f"there is no file format '{schema}'{known_names(schema, FORMATS)}")
+        check_known(schema, FORMATS, DataError, f"there is no file format '{schema}'")
         document = importlib.import_module(FORMATS[schema]).json_schema()
         return CommandOutput(json_text(document), document, f"{schema}.schema")
     if bits:

@@ -13,7 +13,7 @@ from ppafo.arguments import File, Name, Word
 from ppafo.cli.output import CommandOutput, listing
 from ppafo.errors import DataError
 from ppafo.kinds import kind_at
-from ppafo.wording import known_names, one_line
+from ppafo.wording import check_known, one_line
 
 if TYPE_CHECKING:
     from ppafo.documents.toml_text import TomlKind
@@ -121,8 +121,7 @@ def new(
             listed = listing("example", rows, ("name", "summary"))
             return replace(listed, text=f"{listed.text}\n\nppafo new example NAME writes one into a new folder.")
         folder = out or Path(name)
-        if name not in examples:
-            raise DataError(f"there is no example '{name}'{known_names(name, examples)}")
+        check_known(name, examples, DataError, f"there is no example '{name}'")
         example = examples[name]
         if os.path.lexists(folder):
             raise DataError(f"{folder}: already exists; remove it or choose another with --out")
@@ -133,8 +132,7 @@ def new(
         document = {"name": name, "folder": str(folder), "files": [str(path) for path in files], **example}
         return CommandOutput("\n".join(lines), document)
     known = (*KINDS, EXAMPLE)
-    if kind not in known:
-        raise DataError(f"there is no kind of file '{kind}'{known_names(kind, known)}")
+    check_known(kind, known, DataError, f"there is no kind of file '{kind}'")
     if name is None or not _NAME.fullmatch(name):
         given = "is missing; it" if name is None else f"{one_line(name)}:"
         raise DataError(f"NAME {given} must consist of letters, digits, - and _; give a path with --out")

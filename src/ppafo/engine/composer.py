@@ -311,8 +311,9 @@ class Composer(ast.NodeTransformer):
             is_known = is_made_of(owner) or owner is parts_of(self.function)
             return getattr(owner, node.attr, _AT_RUN_TIME) if is_known else _AT_RUN_TIME
         if not hasattr(owner, node.attr):
-            hint = nearest_name(node.attr, dir(owner))
-            raise self.refuse(node, f"module '{owner.__name__}' has no '{node.attr}'{hint}")
+            raise self.refuse(
+                node, f"module '{owner.__name__}' has no '{node.attr}'{nearest_name(node.attr, dir(owner))}"
+            )
         value = getattr(owner, node.attr)
         self.module.note_read(vars(owner), node.attr, value)
         return value

@@ -57,8 +57,9 @@ def _compilers(name: str) -> tuple[Compiler, ...]:
         return (OFFERED[name](),)
     if name not in ("", ANY_OF_C):
         allowed = (ANY_OF_C, *OFFERED, PYTHON)
-        hint = nearest_name(name, allowed)
-        raise SimulationError(f"{BACKEND_VARIABLE} = '{one_line(name)}': must be {', '.join(allowed)}{hint}")
+        raise SimulationError(
+            f"{BACKEND_VARIABLE} = '{one_line(name)}': must be {', '.join(allowed)}{nearest_name(name, allowed)}"
+        )
     compilers: list[Compiler] = []
     for make in OFFERED.values():
         with contextlib.suppress(SimulationError):

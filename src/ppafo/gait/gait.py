@@ -23,7 +23,7 @@ from ppafo.model.gait import HARMONICS as ENGINE_HARMONICS
 from ppafo.model.gait import Harmonic, Series
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
-from ppafo.wording import known_names
+from ppafo.wording import check_known
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -182,8 +182,7 @@ class Gait:
     def curve(self, name: str) -> GaitCurve:
         """Return a curve by name; raises DataError if this gait does not contain the curve."""
         curves = self.curves
-        if name not in curves:
-            raise DataError(f"gait '{self.name}' has no curve '{name}'{known_names(name, curves)}")
+        check_known(name, curves, DataError, f"gait '{self.name}' has no curve '{name}'")
         return curves[name]
 
 

@@ -47,7 +47,7 @@ from ppafo.parameters.parameter_set import (
 )
 from ppafo.parameters.plant import shape_and_growth
 from ppafo.units.shown import counted_from, shown_in, shown_text
-from ppafo.wording import known_names, one_line
+from ppafo.wording import check_known, one_line
 
 SAME_STOP = 1.0e-9
 """Angle difference [rad] below which two angles count as the same."""
@@ -90,10 +90,9 @@ def read_device(parameter_set: ParameterSet, name: str, links: Graph) -> Device:
         remedy = f"use the completed set '{completed}'" if completed else "add them to the file or as overrides"
         raise ParameterError(f"{parameter_set.file}: the device lacks {', '.join(missing)}; {remedy}")
     species = str(parameter_set.texts[declaration.SPECIES_PATH].value)
-    if species not in SPECIES:
-        raise ParameterError(
-            f"{parameter_set.file}: gas.species = '{one_line(species)}' is unknown{known_names(species, SPECIES)}"
-        )
+    check_known(
+        species, SPECIES, ParameterError, f"{parameter_set.file}: gas.species = '{one_line(species)}' is unknown"
+    )
     named = {path.split(".")[1] for path in parameter_set.numbers if path.startswith(f"{SECTION}.")}
     of_effects = {EFFECTS[effect].section: EFFECTS[effect].quantities for effect in sorted(named)}
     atmosphere = atmospheric_pressure(parameter_set)

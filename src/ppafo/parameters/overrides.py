@@ -36,7 +36,7 @@ from ppafo.parameters.parameter_set import (
     written_units,
 )
 from ppafo.units import SI, split_number
-from ppafo.wording import known_names, nearest_name, one_line
+from ppafo.wording import check_known, known_names, nearest_name, one_line
 
 CHOSEN_VALVE = "valve."
 NAMED_VALVE = "valves."
@@ -282,9 +282,8 @@ def _with_text(parameter_set: ParameterSet, path: str, override: Override) -> Pa
     if path == RELIEVING_PATH and value not in ("true", "false"):
         raise ParameterError(f"override '{override}': must be true or false")
     if path == SPECIES_PATH:
-        species = SPECIES.get(value)
-        if species is None:
-            raise ParameterError(f"override '{override}': unknown gas{known_names(value, SPECIES)}")
+        check_known(value, SPECIES, ParameterError, f"override '{override}': unknown gas")
+        species = SPECIES[value]
         note = f"follows from the override {path}={value}"
         for key, unit in (("molar_mass", "kg/mol"), ("heat_capacity_ratio", "")):
             numbers[f"gas.{key}"] = Entry(getattr(species, key), unit, "datasheet", species.source, note)

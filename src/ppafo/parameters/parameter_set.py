@@ -28,7 +28,7 @@ from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.parameters.records import fields_of
 from ppafo.units import SI, base_value, format_quantity, split_quantity, to_si
 from ppafo.units.shown import shown_unit, units_beside
-from ppafo.wording import known_names
+from ppafo.wording import check_known
 
 if TYPE_CHECKING:  # few devices have a measured actuator
     from ppafo.model.actuators.table import Table
@@ -224,10 +224,7 @@ def chosen_valve(parameter_set: ParameterSet, valve: str | None) -> str:
     Raises ParameterError if the set has no such valve.
     """
     name = valve or parameter_set.default_valve
-    if name not in parameter_set.valve_kinds:
-        raise ParameterError(
-            f"{parameter_set.file}: there is no valve '{name}'{known_names(name, parameter_set.valve_kinds)}"
-        )
+    check_known(name, parameter_set.valve_kinds, ParameterError, f"{parameter_set.file}: there is no valve '{name}'")
     return name
 
 

@@ -35,7 +35,7 @@ from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.files import LEFT_ASIDE, add_files, check_files_can_be_added
 from ppafo.storage.owned_folder import entries_of, read_json
 from ppafo.version import __version__
-from ppafo.wording import argument_text, known_names, one_line
+from ppafo.wording import argument_text, check_known, one_line
 
 # File with all true values beside the recordings of a folder, and its format.
 RIG_FILE = "rig.json"
@@ -241,8 +241,7 @@ def record(
     ``overrides`` are texts such as ``friction.static_torque=0.5 N m`` (device), ``run.duration=1 s`` (experiments with
     motion) or ``rig.pressure_sensor.noise=0 Pa_d`` (preset). Raises SimulationError if the run fails.
     """
-    if experiment not in EXPERIMENTS:
-        raise ParameterError(f"there is no experiment '{one_line(experiment)}'{known_names(experiment, EXPERIMENTS)}")
+    check_known(experiment, EXPERIMENTS, ParameterError, f"there is no experiment '{one_line(experiment)}'")
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= LARGEST_SEED:
         raise ParameterError(f"seed = {seed} must be a whole number from 0 to {LARGEST_SEED}")
     overrides = tuple(overrides)

@@ -120,8 +120,10 @@ def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Pres
     for typed, override in override_set(read_overrides(overrides)).items():
         path = typed.removeprefix(PREFIX)
         if path not in PATHS:
-            hint = nearest_name(typed, [f"{PREFIX}{known}" for known in PATHS])
-            raise ParameterError(f"override '{override}': the simulated test bench has no value '{typed}'{hint}")
+            raise ParameterError(
+                f"override '{override}': the simulated test bench has no value '{typed}'"
+                f"{nearest_name(typed, [f'{PREFIX}{known}' for known in PATHS])}"
+            )
         with refused_as(ParameterError, f"override '{override}'", UnitError):
             values[path] = number_in(override.text, PATHS[path])
     valves = {kind: tuple(texts) for kind, texts in document.get("valves", {}).items()}

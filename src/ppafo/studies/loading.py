@@ -49,7 +49,7 @@ from ppafo.studies.varying import (
     varied_path,
 )
 from ppafo.units.shown import shown_unit
-from ppafo.wording import first_twice, known_names
+from ppafo.wording import check_known, first_twice, known_names
 
 _CLOSEST = 1.0 - 1.0e-11
 """Largest coefficient of a correlation matrix that is still positive definite; scores then differ by 5e-6."""
@@ -134,8 +134,7 @@ def drawn_in(
     if name is None and len(configurations) > 1:
         raise StudyError(f"study '{chosen.name}' has several configurations; choose one: {', '.join(configurations)}")
     name = next(iter(configurations)) if name is None else name
-    if name not in configurations:
-        raise StudyError(f"study '{chosen.name}' has no configuration '{name}'{known_names(name, configurations)}")
+    check_known(name, configurations, StudyError, f"study '{chosen.name}' has no configuration '{name}'")
     base = configurations[name]
     if changes and not isinstance(study, Study):
         # The configuration alone, as the others may refuse the changes; without what it does not have.
@@ -308,8 +307,7 @@ def _varied(
     only = entry.get("only")
     with refused_as(StudyError, f"vary '{path}'", ScenarioError, UnitError):
         for name in only or ():
-            if name not in names:
-                raise UnitError(f"only: there is no configuration '{name}'{known_names(name, names)}")
+            check_known(name, names, UnitError, f"only: there is no configuration '{name}'")
         scenarios = [each.scenario for each in configurations if not only or each.name in only]
         texts = texts_of(entry)
         varied, *others = (varied_path(path, scenario, texts, atmosphere_varies) for scenario in scenarios)
@@ -353,8 +351,7 @@ def _scores(correlations: Sequence[Correlation], paths: Sequence[str]) -> Factor
     for pair in correlations:
         first, other = pair.between
         for path in pair.between:
-            if path not in paths:
-                raise StudyError(f"correlations: '{path}' has no distribution{known_names(path, paths)}")
+            check_known(path, paths, StudyError, f"correlations: '{path}' has no distribution")
         if first == other or (first, other) in coefficients or (other, first) in coefficients:
             raise StudyError(
                 f"correlations: between = ['{first}', '{other}'] must name two different paths, and each pair only once"

@@ -44,7 +44,7 @@ from ppafo.simulation.simulate import simulate_many
 from ppafo.units import parse_quantity
 from ppafo.units.shown import in_units, quantity_of_unit
 from ppafo.version import __version__
-from ppafo.wording import argument_text, known_names, one_line
+from ppafo.wording import argument_text, check_known, one_line
 
 EQUILIBRIUM = "equilibrium"
 VALVE = "valve_"
@@ -166,8 +166,7 @@ class LinearModel:
         Raises ScenarioError for an unknown output or input, and for a frequency at which the model has a pole.
         """
         for name, names, role in ((output, self.outputs, "output"), (source, self.inputs, "input")):
-            if name not in names:
-                raise ScenarioError(f"the linear model has no {role} '{one_line(name)}'{known_names(name, names)}")
+            check_known(name, names, ScenarioError, f"the linear model has no {role} '{one_line(name)}'")
         row = self.outputs.index(output)
         column = self.inputs.index(source)
         poles = self.poles

@@ -24,7 +24,7 @@ from ppafo.exports.fmu.interface import Interface, tuning_of, variability_of, va
 from ppafo.exports.fmu.platforms import FLAGS, PLATFORMS, build, host_platform
 from ppafo.storage.files import temporary_folder
 from ppafo.version import __version__
-from ppafo.wording import argument_text, known_names
+from ppafo.wording import argument_text, check_known
 
 _FIRST_DAY = (1980, 1, 1, 0, 0, 0)
 """Earliest date of a zip entry, so that a unit does not depend on its date of creation."""
@@ -148,8 +148,7 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
     """
     # Before anything is built: a misspelt platform should not cost a compilation.
     for name in platforms:
-        if name not in PLATFORMS:
-            raise ScenarioError(f"platform '{name}' is unknown{known_names(name, PLATFORMS)}")
+        check_known(name, PLATFORMS, ScenarioError, f"platform '{name}' is unknown")
         if fmi == 2 and PLATFORMS[name].folder_2 is None:
             raise ScenarioError(f"platform {name} is not defined in FMI 2: give {argument_text('fmi')} 3")
     chosen = {name: PLATFORMS[name] for name in platforms}

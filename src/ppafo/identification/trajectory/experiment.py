@@ -58,7 +58,7 @@ from ppafo.simulation.scenario import (
     with_control,
 )
 from ppafo.units import parse_quantity
-from ppafo.wording import first_twice, known_names
+from ppafo.wording import check_known, first_twice
 
 FITTED_CHANNELS: tuple[str, ...] = get_args(Compared)
 """Channels that a fit can compare with a recording [rad], [Pa], [Pa]."""
@@ -204,9 +204,8 @@ class FittedExperiment:
             why = f"has {count} samples from the start at {self.start:g} s on, but needs at least {MINIMUM_SAMPLES}"
             raise IdentificationError(f"{self.where}: {recording.label} {why}")
         for name in (*self.channels, *inputs):
-            if name not in recording:
-                known = known_names(name, recording.names)
-                raise IdentificationError(f"{self.where}: {recording.label} has no channel '{name}'{known}")
+            said = f"{self.where}: {recording.label} has no channel '{name}'"
+            check_known(name, recording.names, IdentificationError, said)
         motion = vane_motion(scenario)
         has_torque = EXTERNAL_TORQUE in inputs
         is_prescribed = motion.profile is not None
@@ -268,8 +267,7 @@ def declaration_of(path: str, scenario: Scenario) -> Quantity:
     find_effects([path])
     known = declared_numbers(scenario)
     full = full_path(path, scenario)
-    if full not in known:
-        raise IdentificationError(f"{scenario.name}: '{path}' cannot be fitted{known_names(full, known)}")
+    check_known(full, known, IdentificationError, f"{scenario.name}: '{path}' cannot be fitted")
     return known[full]
 
 
@@ -402,9 +400,8 @@ class TrajectoryProblem:
         numbers = []
         wrong = Faults()
         for parameter in self.parameters:
-            for label in (label for label in parameter.recordings if label not in labels):
-                near = known_names(label, labels)
-                raise IdentificationError(f"{parameter.path}: there is no experiment '{label}'{near}")
+            for label in parameter.recordings:
+                check_known(label, labels, IdentificationError, f"{parameter.path}: there is no experiment '{label}'")
             with wrong:
                 numbers.append(
                     number_of(parameter, [item for item in self.experiments if parameter.acts_in(item.label)])

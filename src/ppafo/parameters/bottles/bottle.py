@@ -33,7 +33,7 @@ from ppafo.parameters.parameter_set import NUMBER_ENTRY, SOURCE, TEXT_ENTRY, Ent
 from ppafo.parameters.records import record_from
 from ppafo.units import format_quantity, split_quantity
 from ppafo.units.shown import shown_text
-from ppafo.wording import changed_text, known_names, nearest_name, said_missing
+from ppafo.wording import changed_text, check_known, nearest_name, said_missing
 
 PAPER_BOTTLE = "paper-co2-9oz"
 FILE = TomlKind("bottle", "bottle", resources.files("ppafo.parameters.bottles") / "files", ParameterError)
@@ -134,8 +134,7 @@ def list_fluids() -> tuple[str, ...]:
 def load_fluid(name: str) -> Fluid:
     """Load a fluid by name. Raises ParameterError if it has no property table."""
     available = list_fluids()
-    if name not in available:
-        raise ParameterError(f"there is no property table for '{name}'{known_names(name, available)}")
+    check_known(name, available, ParameterError, f"there is no property table for '{name}'")
     content = json.loads((_TABLES / f"{name}{_SUFFIX}").read_text(encoding="utf-8"))
     columns = {"fractions": content["shares"], **content}
     table = FluidTable(*(_fixed(columns.get(name, ())) for name in FluidTable._fields))
