@@ -8,7 +8,7 @@ from types import FunctionType
 from ppafo.cli.command_line import Command, CommandGroup, UsageError
 from ppafo.kinds import Kinds, is_installed, package_of
 from ppafo.plugins import name_modules_in
-from ppafo.wording import check_known, known_names
+from ppafo.wording import known_names
 
 _ANALYSES = "ppafo.analyses"
 _VERBS = "ppafo.cli.verbs"
@@ -135,7 +135,10 @@ def check_words(words: list[str]) -> None:
         raise UsageError(f"'ppafo {' '.join(shown)}' is part of {package_of(entry.verb)}, which is not installed")
     word = named[0]
     name_modules_in(word)
-    check_known(word, dict.fromkeys((*COMMANDS, *OTHERS)), UsageError, f"there is no command '{word}'")
+    # A command of a module that the person names is known before it is listed.
+    if word not in COMMANDS and word not in OTHERS:
+        known = tuple(dict.fromkeys((*COMMANDS, *OTHERS)))
+        raise UsageError(f"there is no command '{word}'{known_names(word, known)}")
     command = COMMANDS.get(word)
     # A group alone is a mistake, unless its help is asked for, which the parser prints.
     if isinstance(command, CommandGroup) and "-h" not in words and "--help" not in words:
