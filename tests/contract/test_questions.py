@@ -123,7 +123,7 @@ def test_a_command_of_another_package_is_in_the_help_and_in_hints_and_is_refused
 ) -> None:
     assert main(["pressure", *WORDS]) == 2
     assert "there is no command 'pressure', did you mean 'pressures'?" in capsys.readouterr().err
-    assert "  pressures    show what a lower supply pressure costs" in build_parser([]).format_help()
+    assert "  pressures    show what a lower supply pressure costs" in build_parser(["--help"]).format_help()
     for words, said in (
         (["pressures", "torque-task"], "the following arguments are required: --pressure"),
         (["pressures", "torque-task", "--pressure", "40"], "there is no scenario or walk 'torque-task'"),
