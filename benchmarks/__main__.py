@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.command import run_command
+from benchmarks.telling import tell
 from ppafo.cli.output import (
     EXIT_CHECK_FAILED,
     EXIT_GOOD,
     check_output,
     print_result,
-    tell,
     write_files,
 )
 from ppafo.documents.json_text import json_text

@@ -12,7 +12,8 @@ from dataclasses import replace
 
 from benchmarks.command import run_command
 from benchmarks.report import describe_machine
-from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, print_result, tell
+from benchmarks.telling import tell
+from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, print_result
 from ppafo.engine.lanes import Batch, run_batch
 from ppafo.engine.run import batch_of
 from ppafo.errors import SimulationError

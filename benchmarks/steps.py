@@ -17,9 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.command import run_command
+from benchmarks.telling import tell
 from benchmarks.timing import Outcome, run_python
 from ppafo.cli.main import OBJECTS_BETWEEN_COLLECTIONS
-from ppafo.cli.output import EXIT_GOOD, print_result, tell
+from ppafo.cli.output import EXIT_GOOD, print_result
 from ppafo.errors import SimulationError
 
 ENTRY = "import sys; from ppafo.cli.main import main; sys.exit(main())"

@@ -11,10 +11,12 @@ _LONG_WORD = re.compile(r"([^\s/\\]{60})[^\s/\\]{40,}|(\S{200})\S{400,}")
 class PpafoError(Exception):
     """Base class of ppafo's errors: fault and remedy in a one-line message.
 
-    ``parts`` are the separate statements of a message with several.
+    ``parts`` are the separate statements of a message with several. ``argument`` is the faulty argument of the call, if
+    the message itself does not name it.
     """
 
     parts: tuple[str, ...] = ()
+    argument: str = ""
 
     def __str__(self) -> str:
         """Return the message on one printable line, whatever it quotes; of a very long word its begin."""
@@ -61,6 +63,19 @@ class StudyError(PpafoError):
 
 class IdentificationError(PpafoError):
     """Recording that does not allow the requested estimate."""
+
+
+@contextlib.contextmanager
+def at_fault(argument: str) -> Iterator[None]:
+    """Record the faulty argument on errors raised in a ``with`` block; an outer block takes precedence.
+
+    The argument check of the called function puts this name before the message.
+    """
+    try:
+        yield
+    except PpafoError as error:
+        error.argument = argument
+        raise
 
 
 @contextlib.contextmanager

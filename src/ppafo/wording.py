@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from os.path import commonprefix
 from pathlib import Path
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 Value = TypeVar("Value")
 
@@ -189,12 +189,22 @@ def set_within(variable: ContextVar[Value], value: Value) -> Iterator[None]:
         variable.reset(token)
 
 
-_is_typed: ContextVar[bool] = ContextVar("_is_typed", default=False)
+Reader = Literal["caller", "function", "command line"]
+_reader: ContextVar[Reader] = ContextVar("_reader", default="caller")
 
 
-def on_command_line() -> AbstractContextManager[None]:
-    """Name arguments as options of the command line in a ``with`` block, elsewhere as in Python."""
-    return set_within(_is_typed, True)
+def read_by(new_reader: Reader) -> AbstractContextManager[None]:
+    """Set the reader of messages in a ``with`` block: Python caller, package function, or command line.
+
+    Messages name arguments for a Python caller and options on the command line, and neither for a function of the
+    package, whose arguments the user never gave.
+    """
+    return set_within(_reader, new_reader)
+
+
+def reader() -> Reader:
+    """Return the reader of messages in force."""
+    return _reader.get()
 
 
 def argument_text(name: str, value: str = "", option: str = "") -> str:
@@ -205,7 +215,7 @@ def argument_text(name: str, value: str = "", option: str = "") -> str:
     >>> argument_text("peak_flow"), argument_text("peak_flow", "4 g/s")
     ('peak_flow', "peak_flow='4 g/s'")
     """
-    if not _is_typed.get():
+    if _reader.get() != "command line":
         return f"{name}={value!r}" if value else name
     option = option or f"--{name.replace('_', '-')}"
     return f"{option} {shlex.quote(value)}" if value else option
@@ -245,7 +255,7 @@ def override_text(overrides: Iterable[str]) -> str:
     """
     if name := _configuration.get():
         overrides = [f"{name}:{override}" for override in overrides]
-    if not _is_typed.get():
+    if _reader.get() != "command line":
         return f"overrides={list(overrides)!r}"
     return shlex.join(word for override in overrides for word in ("--set", override))
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from ppafo.analyses import ask, np
 from ppafo.arguments import Confidence, MaximumFailed, Name, Overrides, Seed, Tasks, Threads, Whole, Word, checked
-from ppafo.errors import StudyError
+from ppafo.errors import StudyError, at_fault
 from ppafo.plugins import Plugins
 from ppafo.progress import Report
 from ppafo.units.shown import shown_in
@@ -272,7 +272,8 @@ def _chosen(
         pairs = (
             configurations.items() if isinstance(configurations, Mapping) else [("", each) for each in configurations]
         )
-        loaded = [(name, ask.scenario_or_load(scenario)) for name, scenario in pairs]
+        with at_fault("configurations"):
+            loaded = [(name, ask.scenario_or_load(scenario)) for name, scenario in pairs]
         chosen = tuple(ask.Configuration(name or scenario.name, scenario) for name, scenario in loaded)
         if (repeated := first_twice([each.name for each in chosen])) is not None:
             raise StudyError(f"two scenarios are named '{repeated}'; give different names in a study file")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from ppafo.analyses import ask, np
 from ppafo.arguments import Count, Overrides, Threads, Word, checked
-from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, refused_as
+from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, at_fault, refused_as
 from ppafo.plugins import Plugins
 from ppafo.progress import Report
 from ppafo.units import SI
@@ -115,8 +115,10 @@ def find(
     # As in 'supply.pressure=2..6 bar_g' and 'final_error <= 30 N cm'.
     ranged = vary.rpartition("..")[2] if vary.strip().startswith(ask.PATHS_THAT_SET_UNITS) else ""
     with shown_in({**base.device.shown, **ask.units_of_texts((ranged, such_that.rpartition("=")[2]))}):
-        path, low, high = _range(vary, base)
-        limit = _limit(such_that, base, path.path)
+        with at_fault("vary"):
+            path, low, high = _range(vary, base)
+        with at_fault("such_that"):
+            limit = _limit(such_that, base, path.path)
         # Both ends and one between.
         if not 3 <= grid <= 100_000:
             raise StudyError(f"grid = {grid}: must be at least 3 and at most 100,000")

@@ -13,11 +13,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ppafo.analyses import ask
 from ppafo.arguments import Word, checked
 from ppafo.documents.json_text import fields_of, plain
-from ppafo.identification.estimate import Estimate, Identified
+from ppafo.identification.estimate import (
+    NAMED,
+    Estimate,
+    Identified,
+    digits_of,
+    in_shown_unit,
+    interval_factor,
+    interval_texts,
+    shown_text,
+)
 from ppafo.plugins import Plugins
 from ppafo.progress import Report, report_nothing
 from ppafo.units.shown import counted_from, in_units, shown_in
-from ppafo.wording import count_of, percentage
+from ppafo.wording import count_of, first_twice, percentage
 
 if TYPE_CHECKING:
     from ppafo.identification.bench.law import BenchContext, BenchResult
@@ -238,7 +247,6 @@ def _compared(
     Two values contradict each other where their difference is significant at 1 % over all numbers that two results
     have. Friction may differ from recording to recording by the tolerance of the bench.
     """
-    from ppafo.identification.estimate import interval_factor, shown_text
     from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 
     compared = [*results]
@@ -292,14 +300,12 @@ def _solve_section(
     recordings from which these were obtained.
     """
     from ppafo.errors import DataError, IdentificationError
-    from ppafo.identification.estimate import in_shown_unit
     from ppafo.identification.fit import FitNumber
     from ppafo.identification.source import RecordingSource, remarks_on_readings
     from ppafo.identification.trajectory import experiment as of_motion
     from ppafo.identification.trajectory.fitting import expected_information, fit
     from ppafo.parameters.overrides import read_overrides
     from ppafo.simulation.recorded.usual_errors import deviation_of_limit
-    from ppafo.wording import first_twice
 
     try:
         experiments = tuple(of_motion.experiment_of(entry, context, reader) for entry in section.experiments)
@@ -465,7 +471,6 @@ def _part(
 
     Of the tolerances ``known`` those are said that widen an interval most, and those that contradict the recordings.
     """
-    from ppafo.identification.estimate import NAMED, digits_of, interval_texts
     from ppafo.identification.new_set import in_set_unit
     from ppafo.parameters.parameter_set import entry_text, number_in_si
 

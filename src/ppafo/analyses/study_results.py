@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from ppafo.analyses import ask, np
 from ppafo.arguments import checked
 from ppafo.documents.json_text import plain
-from ppafo.errors import DataError, StudyError, UnitError, refused_as
+from ppafo.errors import DataError, StudyError, UnitError, at_fault, refused_as
 from ppafo.report.kind import YES_OR_NO, of_stored_metric
 from ppafo.report.style import font_size
 from ppafo.signals.recording import CHANNELS
@@ -200,7 +200,8 @@ def load_study_results(folder: str | Path) -> ask.Finding[StudyResults]:
     'torque-task-uncertainty: 8 runs: 8 completed'
     """
     stored = study_folder(folder)
-    document = read_manifest(stored)
+    with at_fault("folder"):
+        document = read_manifest(stored)
     try:
         summary = stored.document(SUMMARY)
     except (OSError, ValueError) as error:

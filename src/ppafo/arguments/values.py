@@ -29,7 +29,7 @@ from ppafo.errors import ArgumentError, KindError, PpafoError
 from ppafo.kinds import fault_of_user
 from ppafo.plugins import name_plugins
 from ppafo.units import SI, carried
-from ppafo.wording import nearest_name
+from ppafo.wording import nearest_name, read_by, reader
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -54,13 +54,18 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
         # NumPy's usual handling of errors, whatever the host program has set: an underflow is 0, and nothing to raise.
         numpy = sys.modules.get("numpy")
         usual = contextlib.nullcontext() if numpy is None else numpy.errstate(all="warn", under="ignore")
-        with usual:
+        asking = reader()
+        with usual, read_by("function") if asking == "caller" else contextlib.nullcontext():
             try:
                 name_plugins(values.get("plugins", ()))
                 return function(**values)  # type: ignore[call-arg]  # names and types are those of the signature
+            except PpafoError as error:
+                if asking == "caller" and error.argument in values:
+                    error.args = (f"{error.argument}: {error}",)
+                raise
             except OSError as error:
                 # Of a name too long to be asked whether there is such a file.
-                if error.errno != errno.ENAMETOOLONG:
+                if error.errno != errno.ENAMETOOLONG or asking == "function":
                     raise
                 longest = max(Path(str(error.filename)).parts, key=len)
                 given = next((f"{name}: " for name, value in values.items() if longest in str(value)), "")

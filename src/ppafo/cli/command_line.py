@@ -25,7 +25,7 @@ from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import ArgumentError, PpafoError
 from ppafo.kinds import kind_at
 from ppafo.plugins import name_modules_in, name_plugins
-from ppafo.wording import nearest_name, on_command_line
+from ppafo.wording import nearest_name, read_by
 
 if TYPE_CHECKING:
     from importlib.abc import InspectLoader
@@ -247,17 +247,18 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     name_modules_in(str([values[parameter] for parameter in _NAMING if parameter in values]))
     for argument in arguments_of(verb):
         if command.listing and values[argument.parameter.name] is None and argument.is_required:
-            noun = argument.word.metavar.lower()
-            raise UsageError(f"no {noun} was given; 'ppafo {name} --list' shows the available names")
+            raise UsageError(
+                f"no {argument.word.metavar.lower()} was given; 'ppafo {name} --list' shows the available names"
+            )
     folder = None
     if OUT not in parameters:
         folder = parsed.out
         if folder is None and command.default_folder:
-            with on_command_line():
+            with read_by("command line"):
                 folder = kind_at(command.default_folder)(values)
         # Before the verb runs: a folder that is refused must not cost a long run.
         output.check_output(folder, name)
-    with output.progress_line() as progress, on_command_line():
+    with output.progress_line() as progress, read_by("command line"):
         answer = verb(**values, **({PROGRESS: progress} if PROGRESS in parameters else {}))
     return output.deliver(answer, parsed.json, folder, name, has_written=OUT in parameters)
 

@@ -8,6 +8,10 @@ from ppafo.arguments import FigureWidth, File, Folder
 from ppafo.cli import output
 from ppafo.cli.output import CommandOutput
 from ppafo.errors import DataError
+from ppafo.storage.files import write_file
+from ppafo.storage.owned_folder import MARK, entries_of, marking_command, read_json
+from ppafo.storage.result_folder import MANIFEST, NETCDF_FILE, RUN_FILE, add_to_folder
+from ppafo.units.shown import shown_in
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,16 +42,12 @@ def export_figure(folder: Folder, *, out: File | None = None, width: FigureWidth
             allowed = ", ".join(f".{name}" for name in FIGURE_FORMATS)
             raise DataError(f"--out {out}: the name must end in one of {allowed}")
         output.check_new_file(out)
-    from ppafo.report.style import load_drawing
-    from ppafo.storage.owned_folder import entries_of
+    from ppafo.report.style import drawn_at, load_drawing, render_figure
 
     if not folder.is_dir():
         raise DataError(f"{folder}: is not a folder")
     names = sorted(entry.name for entry in entries_of(folder))
     load_drawing()
-    from ppafo.report.style import drawn_at, render_figure
-    from ppafo.storage.files import write_file
-    from ppafo.storage.result_folder import add_to_folder
 
     with drawn_at(width):
         figures = _drawn(folder, names)
@@ -79,10 +79,7 @@ def _drawn(folder: Path, names: list[str]) -> "dict[str, Figure]":
     from ppafo.analyses.study_results import load_study_results
     from ppafo.report.recording_figure import draw_stored_walk, read_result, recording_figure, stated_units
     from ppafo.rig.experiments import RIG_FILE
-    from ppafo.storage.owned_folder import MARK, read_json
     from ppafo.storage.reading import read_recording
-    from ppafo.storage.result_folder import MANIFEST, NETCDF_FILE, RUN_FILE
-    from ppafo.units.shown import shown_in
 
     if RUN_FILE in names:
         return {"figure": read_result(folder).plot()}
@@ -106,8 +103,6 @@ def _drawn(folder: Path, names: list[str]) -> "dict[str, Figure]":
 
 def _figures_to_open(folder: Path, names: list[str], out: Path | None, width: float | None) -> CommandOutput:
     """List the figures of a result that cannot be drawn again. Raises DataError if a file or a width is requested."""
-    from ppafo.storage.owned_folder import MARK, marking_command
-
     if MARK not in names:
         raise DataError(f"{folder}: is not a result folder of ppafo; give a folder written by a ppafo command")
     command = marking_command(folder)

@@ -217,9 +217,4 @@ def progress_line() -> Iterator[ProgressLine]:
 
 def _tell_drawing() -> None:
     if sys.stderr.isatty():
-        tell("drawing figures and page")
-
-
-def tell(text: str) -> None:
-    """Print a message on work in progress to standard error."""
-    print(f"ppafo: {text} ...", file=sys.stderr, flush=True)
+        print("ppafo: drawing figures and page ...", file=sys.stderr, flush=True)

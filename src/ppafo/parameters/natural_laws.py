@@ -130,7 +130,12 @@ def valve_departure(model: ValveModel, settings: Any, plant: Any) -> LawDepartur
                 parts = parts + 1
             ports = model.connect(plant, shown)
             flows.append([model.port_flow(pressure, port, plant.valve_curve)[0].total for port in ports])
-        openings = model.instant(valve, model.settle(valve, state, command, time), command)
+        settled = model.settle(valve, state, command, time)
+        rates = state if model.rates is None else model.rates(valve, state, command)
+        if not type(state) is type(settled) is type(rates):
+            states = f"settle and rates must return a {type(state).__name__}"
+            return LawDeparture(math.inf, f"{states}, not {settled!r} and {rates!r}")
+        openings = model.instant(valve, settled, command)
         ports = blended_ports(plant, openings)
         instant = [blended_port_flow(pressure, port, plant.valve_curve)[0].total for port in ports]
         for number, (last, former, other) in enumerate(zip(flows[-1], flows[-2], instant, strict=True), 1):

@@ -245,23 +245,20 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
         from ppafo.metrics.metric import Metrics
 
         rows = rows_by_path(run, outcome.record[: times.size])
-        check_commands(scenario, times, rows["result.command"])
+        # A valve opens by 1 at most, and says nothing of more.
+        commands = rows["result.command"]
+        vents = scenario.motion.motion_kind.layout == WALK
+        is_command = (np.abs(commands) <= 1.0) | (vents & (commands == VENT))
+        if not is_command.all():
+            sample = int(np.argmin(is_command))
+            raise KindError(
+                f"controller '{scenario.controller.kind}': command {commands[sample]:.6g} at t = {times[sample]:.6g} s"
+                ": must be -1 to 1"
+            )
         recording, metrics = scenario.motion.motion_kind.measured(scenario, run, times, rows)
         return recording, Metrics(metrics)
 
     return Result(scenario, status, versions, engine, DeferredResult(measured))
-
-
-def check_commands(scenario: Scenario, times: Floats, commands: Floats) -> None:
-    """Raise KindError for a command [-] that is none: a valve opens by 1 at most, and says nothing of more."""
-    is_vent = (commands == VENT) & (scenario.motion.motion_kind.layout == WALK)
-    is_command = (np.abs(commands) <= 1.0) | is_vent
-    if not is_command.all():
-        sample = int(np.argmin(is_command))
-        raise KindError(
-            f"controller '{scenario.controller.kind}': command {commands[sample]:.6g} at t = {times[sample]:.6g} s: "
-            "must be -1 to 1"
-        )
 
 
 def rows_by_path(run: Run, record: Floats) -> dict[str, Floats]:

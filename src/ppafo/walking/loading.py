@@ -9,7 +9,7 @@ from typing import Any
 from ppafo.arguments import Overrides, checked
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.documents.toml_text import TomlKind
-from ppafo.errors import DataError, ParameterError, ScenarioError, refused_as
+from ppafo.errors import DataError, ParameterError, ScenarioError, at_fault, refused_as
 from ppafo.gait import NORMATIVE, load_gait
 from ppafo.model.catalog import VALVES
 from ppafo.parameters import ParameterSet
@@ -189,9 +189,10 @@ def load_walk(
     named = [f"{path}={from_here(value)}" for path, value in chosen.items() if value is not None]
     changes = read_overrides((*overrides, *named), ScenarioError)
     replacing = set_or_load(parameter_set)
-    request = request_of_file(
-        scenario, changes, replacing, SCENARIO_FILE if str(scenario) in list_scenarios() else FILE
-    )
+    with at_fault("scenario"):
+        request = request_of_file(
+            scenario, changes, replacing, SCENARIO_FILE if str(scenario) in list_scenarios() else FILE
+        )
     return scenario_of(request, WALKING)
 
 

@@ -129,8 +129,8 @@ def test_a_name_is_taken_wherever_an_object_is() -> None:
     assert [run.scenario.name for run in ppafo.simulate_many(TASK)] == [TASK]
 
 
-def test_an_error_about_the_content_of_an_argument_keeps_its_class() -> None:
-    with pytest.raises(StudyError, match=r"^'nonsense' is not of the form"):
+def test_an_error_about_the_content_of_an_argument_begins_with_its_name() -> None:
+    with pytest.raises(StudyError, match=r"^vary: 'nonsense' is not of the form"):
         ppafo.find(TASK, vary="nonsense", such_that="rms_error <= 1 N m")
 
 

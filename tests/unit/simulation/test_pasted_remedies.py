@@ -13,7 +13,7 @@ from ppafo.counterfactuals import verdict_of
 from ppafo.documents.toml_text import table_lines
 from ppafo.loading import load_scenario, reloaded, usage_text
 from ppafo.simulation.simulate import simulate
-from ppafo.wording import on_command_line
+from ppafo.wording import read_by
 
 RAMP = [
     "reference.kind=ramp_hold",
@@ -65,7 +65,7 @@ def test_a_remedy_is_pasted_into_a_command_and_into_a_file_and_both_are_the_run_
     scenario: str, changes: list[str], tmp_path: Path
 ) -> None:
     loaded = load_scenario(scenario, changes)
-    with on_command_line():
+    with read_by("command line"):
         verdict = verdict_of(simulate(loaded))
         assert verdict.fails
         assert verdict.mended

@@ -23,6 +23,7 @@ from ppafo.errors import (
     PpafoError,
     StudyError,
     UnitError,
+    at_fault,
     refused_as,
 )
 from ppafo.gait import load_gait
@@ -235,7 +236,8 @@ def load_design(problem: str | Path, *, profile: str | Path | None = None, plugi
     >>> ppafo.load_design("push-off").name
     'push-off'
     """
-    source = FILE.load(problem)
+    with at_fault("problem"):
+        source = FILE.load(problem)
     file = source.label
     folder = source.folder
     document = checked_record(SizingFile, source)
@@ -247,7 +249,8 @@ def load_design(problem: str | Path, *, profile: str | Path | None = None, plugi
     pressures = []
     with wrong:
         if profile:
-            required = read_profile(ProfileSection(recording=str(profile)), Path(), f"{file}: profile")
+            with at_fault("profile"):
+                required = read_profile(ProfileSection(recording=str(profile)), Path(), f"{file}: profile")
         else:
             required = read_profile(document.profile, folder, f"{file}: profile")
         largest = required.largest

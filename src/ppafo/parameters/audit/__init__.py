@@ -14,6 +14,7 @@ from ppafo.parameters.audit.changes import changes
 from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence, NamedValue, Question, Severity
 from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, overridden_paths, with_followers
+from ppafo.wording import count_of
 
 __all__ = ["AuditFinding", "ComparedNumber", "NamedValue", "Severity", "changed_paths", "findings_of"]
 
@@ -60,6 +61,28 @@ def findings_of(audited: ParameterSet, parent: ParameterSet | None = None) -> li
     for question in QUESTIONS:
         with contextlib.suppress(ParameterError):
             findings.extend(question(evidence))
+    if of_parent is not None:
+        before = of_parent.entries()
+        after = evidence.parameter_set.entries()
+        copied = [
+            change.path
+            for change in changes(audited, of_parent)
+            if (old := before.get(change.path)) is not None
+            and (new := after.get(change.path)) is not None
+            and (new.origin, new.source) == (old.origin, old.source)
+            # A number that follows another has its source from there.
+            and not new.note.startswith("follows")
+        ]
+        if copied:
+            findings.append(
+                evidence.finding(
+                    "copied-sources",
+                    f"{count_of(len(copied), 'value')} changed, with the source of the parent set",
+                    copied,
+                    why=f"State where they are from: {', '.join(copied)}.",
+                    severity="warning",
+                )
+            )
     changed = overridden_paths(audited)
     ids = {finding.id for finding in findings}
     judged = []
