@@ -134,7 +134,6 @@ def test_a_synthetic_recording_stays_one_through_a_column_map(tmp_path: Path) ->
     ("text", "message"),
     [
         ("0,1\n10,x\n", "line 2, column '2': 'x' is not a finite number"),
-        ("0,1\n10,2\n10,3\n", "line 3, column 'time': the clock stands still"),
         ("0,1\n10,2\n5,3\n", "line 3, column 'time': the clock goes backwards"),
         ("0,1\n10\n", "line 2 has 1 values for 2 columns"),
         ("\n\n", "has no rows"),

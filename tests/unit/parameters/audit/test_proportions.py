@@ -108,4 +108,5 @@ def test_audit_new_set_and_the_second_line_of_a_run_say_it_with_range_and_source
     new("set", "mine", source="ppafo2011", out=copied)
     text = copied.read_text(encoding="utf-8")
     copied.write_text(text.replace("value = 0.45\n", "value = 4500.0\n", 1), encoding="utf-8")
+    assert "[copied-sources]" in str(ppafo.audit(copied))
     assert new("set", "next", source=str(copied), out=tmp_path / "next.toml").text.endswith(f"\nwarning: {said}")
