@@ -74,14 +74,12 @@ def _check_law(kind: ControllerKind, settings: type) -> None:
     ones = [min(max(1.0, item.minimum), item.maximum) for item in kind.quantities]
     defaults = [item.default or 0.0 for item in kind.quantities]
     for numbers, reference in product((defaults, ones), _REFERENCES):
-        parameters = rebuilt(settings, map(float, numbers))
-        try:
-            command, after = kind.update(parameters, kind.initial, reference, _MEASUREMENT, 1.0e-3)
+        arguments = (rebuilt(settings, map(float, numbers)), kind.initial, reference, _MEASUREMENT, 1.0e-3)
+        with contextlib.suppress(ArithmeticError, ValueError):
+            command, after = kind.update(*arguments)
             break
-        except (ArithmeticError, ValueError) as error:
-            undefined = error
     else:
-        raise undefined
+        command, after = kind.update(*arguments)
     is_state = type(after) is type(kind.initial) and all(isinstance(number, float) for number in leaves(after))
     if not is_state or not isinstance(command, float) or not -1.0 <= command <= VENT:
         raise ValueError(

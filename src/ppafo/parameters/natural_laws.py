@@ -133,8 +133,10 @@ def valve_departure(model: ValveModel, settings: Any, plant: Any) -> LawDepartur
         settled = model.settle(valve, state, command, time)
         rates = state if model.rates is None else model.rates(valve, state, command)
         if not type(state) is type(settled) is type(rates):
-            states = f"settle and rates must return a {type(state).__name__}"
-            return LawDeparture(math.inf, f"{states}, not {settled!r} and {rates!r}")
+            return LawDeparture(
+                math.inf,
+                f"settle and rates must return a {type(state).__name__}, not {settled!r} and {rates!r}",
+            )
         openings = model.instant(valve, settled, command)
         ports = blended_ports(plant, openings)
         instant = [blended_port_flow(pressure, port, plant.valve_curve)[0].total for port in ports]
@@ -209,6 +211,9 @@ def broken_laws(device: Device) -> Iterator[str]:
     if not VALVES.is_own(valve):
         settings = first_settings(device.valve)
         model = VALVES[valve].choose(settings)
+        # Only analyses ask for it, of which the error would be.
+        if (lag := VALVES[valve].lag) is not None:
+            lag(settings)
         if problem := valve_problem(model):
             yield f"valve '{one_line(valve)}': {problem}"
             return

@@ -247,8 +247,7 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
         rows = rows_by_path(run, outcome.record[: times.size])
         # A valve opens by 1 at most, and says nothing of more.
         commands = rows["result.command"]
-        vents = scenario.motion.motion_kind.layout == WALK
-        is_command = (np.abs(commands) <= 1.0) | (vents & (commands == VENT))
+        is_command = (np.abs(commands) <= 1.0) | ((commands == VENT) & (scenario.motion.motion_kind.layout == WALK))
         if not is_command.all():
             sample = int(np.argmin(is_command))
             raise KindError(

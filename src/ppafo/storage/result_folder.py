@@ -118,9 +118,10 @@ def read_stored(folder: str | Path) -> StoredResult:
     if not folder_path.is_dir():
         raise DataError(f"{folder}: is not a folder")
     if not (folder_path / RUN_FILE).is_file() and (folder_path / MARK).is_file():
-        recording = folder_path / NETCDF_FILE
-        remedy = f"; its recording is read_recording('{recording}')" if recording.is_file() else ""
-        raise DataError(f"{folder}: is a result of 'ppafo {marking_command(folder_path)}', not of a run{remedy}")
+        raise DataError(
+            f"{folder}: is a result of 'ppafo {marking_command(folder_path)}', not of a run; "
+            f"read_recording('{folder}') gives the recording of a walk"
+        )
     if not (folder_path / RUN_FILE).is_file() and (folder_path / MANIFEST).is_file():
         raise DataError(f"{folder}: contains the results of a study, not of a run")
     document = read_document(folder_path)

@@ -79,6 +79,8 @@ def valve_problem(valve: ValveModel) -> str:
     """Describe a state without defaults, or an output whose class is not known, or another; empty without a fault."""
     if not isinstance(valve, ValveModel):
         return f"choose(settings) must return a ValveModel, not {valve!r}"
+    if not callable(valve.next_event) or not isinstance(valve.jumps, bool):
+        return f"next_event must be a function and jumps a bool, not {valve.next_event!r} and {valve.jumps!r}"
     without = [name for name in valve.state._fields if name not in valve.state._field_defaults]  # type: ignore[attr-defined]
     if without:
         return (
