@@ -18,9 +18,8 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import SimulationError
 from ppafo.exports.c_library import library_of
-from ppafo.exports.c_library.exported import COUNTS
 from ppafo.exports.c_library.files import library_files
-from ppafo.exports.c_library.library import c_identifier
+from ppafo.exports.c_library.library import COUNTS, c_identifier
 from ppafo.exports.fmu.interface import closed_loop
 from ppafo.exports.fmu.platforms import host_platform
 from ppafo.exports.fmu.unit import functional_unit

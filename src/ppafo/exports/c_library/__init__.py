@@ -7,9 +7,8 @@ from ppafo.control.catalog import CONTROLLERS
 from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library.entries import check_entry, follow_entry, prepare_entry
-from ppafo.exports.c_library.exported import exported
 from ppafo.exports.c_library.files import expected_csv, library_files, words_of
-from ppafo.exports.c_library.library import Library, Switch, c_identifier
+from ppafo.exports.c_library.library import Library, Switch, c_identifier, exported
 from ppafo.exports.c_library.preparation import PROFILE_RULES, VANE_PREPARATION, WALK_RULES, Preparation, has_rules
 from ppafo.exports.c_library.settings import (
     RULES_OF_TIMES,

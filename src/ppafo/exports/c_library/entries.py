@@ -11,8 +11,7 @@ from ppafo.engine.plain_python import stored_names
 from ppafo.engine.rows import given, leaf_paths
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
-from ppafo.exports.c_library.exported import COUNTS
-from ppafo.exports.c_library.library import ExportParameter, Library, c_identifier
+from ppafo.exports.c_library.library import COUNTS, ExportParameter, Library, c_identifier
 from ppafo.exports.c_library.preparation import Preparation
 from ppafo.exports.c_library.settings import numbers_of_second_chamber
 from ppafo.model.declaration import PlainFunction

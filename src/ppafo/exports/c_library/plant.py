@@ -6,9 +6,8 @@ from functools import singledispatch
 
 from ppafo.control.controllers import switching
 from ppafo.exports.c_library import library_of
-from ppafo.exports.c_library.exported import ExportedProgram
 from ppafo.exports.c_library.files import expected_csv, library_files
-from ppafo.exports.c_library.library import ExportParameter, Library, LibraryApi, c_identifier
+from ppafo.exports.c_library.library import ExportedProgram, ExportParameter, Library, LibraryApi, c_identifier
 from ppafo.exports.c_library.walk_preparation import check_can_be_exported
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.valves.kind import VENT

@@ -20,8 +20,7 @@ from ppafo.engine.linking import link_program
 from ppafo.engine.loop_text import LOOP_OF_RUN, run_loop
 from ppafo.engine.rows import is_number, is_row, leaf_paths, members, taken
 from ppafo.engine.source_text import SourceCollector, composed_lines
-from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, WHOLE, ExportedProgram
-from ppafo.exports.c_library.library import Library
+from ppafo.exports.c_library.library import COUNTS, IN_PARTS, WHOLE, ExportedProgram, Library
 from ppafo.metrics.metric import ReadAt, Readings
 from ppafo.model.columns import over_runs
 from ppafo.translation.value_types import FLOAT, INT, Items, Row, RowReference, Type, declared_type
