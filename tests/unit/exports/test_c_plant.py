@@ -9,14 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.exports.c_library import c_library
 from ppafo.exports.c_library.plant import plant_library
 from ppafo.exports.fmu.platforms import FLAGS
 from ppafo.simulation.loading import load_scenario
 
 LED = "torque-task-proportional", ()
 """A locked ankle, which inputs lead."""
-PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "export.md").read_text(encoding="utf-8")
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-fsanitize=address,undefined", "-static-libasan")
 
 
@@ -98,23 +96,6 @@ def test_the_plant_of_a_loop_whose_gains_follow_other_numbers_has_neither_gains_
     header = next(text for file, text in plant_library(load_scenario(name)).items() if file.endswith(".h")).decode()
     assert "actuator_" in header
     assert not re.search(r"double (controller_\w*(gain|stiffness)|reference_\w+);", header)
-
-
-@pytest.mark.parametrize("shape", ["loop", "plant"])
-def test_the_c_of_a_run_is_short_and_has_neither_lanes_nor_groups_that_are_packed_again(shape: str) -> None:
-    files_of = {"loop": c_library, "plant": plant_library}[shape]
-    contents = files_of(load_scenario("torque-task-proportional"))
-    (text,) = (content.decode() for file, content in contents.items() if file.startswith("torque") and file[-1] == "c")
-    # Gas is metered, loads are a port, a plant at rest takes whole steps, and profiles are held to their rules.
-    assert text.count("\n") < {"loop": 3100, "plant": 2310}[shape]
-    said = {"loop": "The torque task has about {:,} lines", "plant": "the plant alone about {:,};"}[shape]
-    assert said.format(round(text.count("\n"), -2)) in PAGE
-    assert not re.search(r"\blane\b|\[0\]\[|PPAFO_|make_PlantParameters|AT_[A-Z]+_", text)
-    assert text.count("for (int64_t step = ") == 1
-    functions = set(re.findall(r"^static [\w ]+?\b\*?(\w+)\(", text, re.MULTILINE))
-    assert functions
-    unused = [name for name in functions if len(re.findall(rf"\b{name}\b", text)) < 2]
-    assert unused == []
 
 
 @pytest.mark.long

@@ -93,8 +93,9 @@ _ORIGINS = {
     "synthetic": "synthetic, not measured",
 }
 _READING = (
-    "The chosen pressure is the lowest with which the smallest bottle suffices; the table also has the lowest pressure "
-    "that keeps the error limit.",
+    "The chosen pressure is the lowest that holds the whole peak with the smallest bottle, if one lasts, else the "
+    "lowest with which the smallest bottle suffices; the table also has the lowest pressure that keeps the error "
+    "limit.",
     "Error margin: RMS error below its limit. Torque margin: torque at this pressure above the largest torque of the "
     "profile; below 0 the peak is cut off, as far as the error limit allows. "
     "Flow margin: possible reduction of the opening at a gauge pressure 10 % higher. Gas margin: usable gas in the "
@@ -184,7 +185,11 @@ class Sizing:
                 if working
                 else [f"no valve keeps the error limit; the smallest error is {nearest}"]
             )
-            reasons += [f"{each.name}{cut}" for each in working or self.valves if (cut := self._cut_peak(each))]
+            reasons += [
+                f"{each.name}{cut}"
+                for each in working or self.valves
+                if each.error == each.error and (cut := cut_peak(self.problem, each.pressure))
+            ]
             return f"no suggestion: {'; '.join(reasons)}"
         bottle = "" if choice.bottle is None else f" and {choice.bottle.name}"
         short = [
@@ -194,16 +199,8 @@ class Sizing:
             and (reached := np.max(sign * recording["torque"])) < REACHED * peak
         ]
         reaches = f"; reaches {' and '.join(short)} in the simulated run" if short else ""
-        suggested = f"suggested: {choice.name} at {PRESSURE.text(choice.pressure)}{bottle}"
-        return f"{suggested}, the smallest that lasts and keeps the error limit{self._cut_peak(choice)}{reaches}"
-
-    def _cut_peak(self, sized: SizedValve) -> str:
-        """Return the fraction of the peak torque that a valve's pressure cuts off; "" for a whole peak."""
-        largest = self.problem.profile.largest
-        most = self.problem.ceiling(sized.pressure)
-        if (cut := 1.0 - most / largest) <= _WHOLE_PEAK or sized.error != sized.error:
-            return ""
-        return f", with {100.0 * cut:.0f} % of the peak cut off (at most {TORQUE.text(most)} of {TORQUE.text(largest)})"
+        suggested = f"suggested: {choice.name} at {PRESSURE.text(choice.pressure)}{bottle}, the smallest that lasts and"
+        return f"{suggested} keeps the error limit{cut_peak(self.problem, choice.pressure)}{reaches}"
 
     def json_document(self) -> dict[str, Any]:
         """Return the sized valves and the suggestion as plain data in SI."""
@@ -284,7 +281,7 @@ class Trials:
         trial["gains"] = gains
         trial["error"] = error.max(axis=0)
         trial["gas"] = gas.mean(axis=0) / problem.simulated
-        trial["works"] = (trial["error"] <= problem.largest_error) & (pressure >= peak_pressure(problem))
+        trial["works"] = (trial["error"] <= problem.largest_error) & (pressure >= torque_pressure(problem))
         return trial
 
     def best(self, valve: Numbers, pressure: Floats, opening: float = 1.0, like: int = 0) -> Trial:
@@ -345,9 +342,13 @@ def size_for_profile(problem: SizingProblem, threads: int | None, report: Report
         elapsed = time.perf_counter() - started
         report(Progress(f"trying {name}", len(valves), len(problem.valves), 0, 0, elapsed, "valves"))
         valves.append(_size_valve(trials, name))
-    lasting = [(each.bottle.mass, each.gas, row) for row, each in enumerate(valves) if each.bottle]
-    # Of valves with the same bottle the one that uses least gas.
-    choice = valves[min(lasting)[2]] if lasting else None
+    lasting = [
+        (bool(cut_peak(problem, each.pressure)), each.bottle.mass, each.gas, row)
+        for row, each in enumerate(valves)
+        if each.bottle
+    ]
+    # What is not cut off comes first; of valves with the same bottle the one that uses least gas.
+    choice = valves[min(lasting)[-1]] if lasting else None
     recording = None
     if choice is not None:
         columns = trials.columns(problem.valves[choice.name], np.array([choice.pressure]), np.array([0]))
@@ -365,12 +366,13 @@ def _size_valve(trials: Trials, name: str) -> SizedValve:
     works = tried["works"]
     in_all = tried["gas"] * problem.repetitions * (1.0 + problem.reserve)
     bottles = [smallest_bottle(problem.bottles, gas) for gas in in_all.tolist()]
-    # The smallest error, where a failed run has none, or the smallest bottle at the lowest pressure that works.
-    measure = np.where(np.isnan(tried["error"]), np.inf, tried["error"])
-    if works.any():
-        masses = np.where(works, [np.inf if bottle is None else bottle.mass for bottle in bottles], np.inf)
-        measure = masses if np.isfinite(masses).any() else ~works
-    chosen = int(np.argmin(measure))
+    # The smallest error, where a failed run has none; or, of pressures that work, one that cuts nothing off, with the
+    # smallest bottle, and of these the lowest.
+    errors = np.nan_to_num(tried["error"], nan=np.inf)
+    masses = np.array([np.inf if bottle is None else bottle.mass for bottle in bottles])
+    is_cut = np.array([bool(cut_peak(problem, pressure)) for pressure in tried["pressure"].tolist()])
+    order = np.lexsort((masses, is_cut, np.isinf(masses), ~works)) if works.any() else np.argsort(errors, kind="stable")
+    chosen = int(order[0])
     pressure, error, gas, gains, _ = tried[chosen].tolist()
     lowest = None
     bottle = None
@@ -448,6 +450,9 @@ def try_pressures(trials: Trials, name: str) -> Trial:
     valve = trials.problem.valves[name]
     found = list[tuple[float, float, int, Trial]]()
     pressures = np.linspace(problem.lowest_pressure, problem.highest_pressure, GRID)
+    if problem.lowest_pressure < (whole := torque_pressure(problem, 1.0)) < problem.highest_pressure:
+        # The lowest pressure that cuts nothing off, which a suggestion has if it can.
+        pressures = np.union1d(pressures, whole)
     for first in range(0, len(trials.gain_sets), trials.combinations):
         tried = trials.best(valve, pressures, like=first)
         while lowest := int(tried["works"].argmax()):
@@ -510,7 +515,7 @@ def ceiling_pressure(problem: SizingProblem) -> float:
     from scipy.optimize import brentq
 
     atmosphere = problem.atmosphere
-    for_peak = peak_pressure(problem)
+    for_peak = torque_pressure(problem)
     # A limit that is kept without any torque has no root: brentq needs a change of sign.
     if cut_error(problem, atmosphere) <= problem.largest_error:
         return for_peak
@@ -520,10 +525,19 @@ def ceiling_pressure(problem: SizingProblem) -> float:
     return max(root, for_peak)
 
 
-def peak_pressure(problem: SizingProblem) -> float:
-    """Return the pressure [Pa absolute] for the required share of the peak torque; equation (2)."""
+def torque_pressure(problem: SizingProblem, share: float = LEAST_PEAK) -> float:
+    """Return the pressure [Pa absolute] for a share of the peak torque, unless given the required one; equation (2)."""
     torque_constant = problem.scenario.device.actuator.torque_constant
-    return problem.atmosphere + pressure_for_torque(LEAST_PEAK * problem.profile.largest, torque_constant)
+    return problem.atmosphere + pressure_for_torque(share * problem.profile.largest, torque_constant)
+
+
+def cut_peak(problem: SizingProblem, pressure: float) -> str:
+    """Return the fraction of the peak torque that a pressure [Pa absolute] cuts off; "" for a whole peak."""
+    largest = problem.profile.largest
+    most = problem.ceiling(pressure)
+    if (cut := 1.0 - most / largest) <= _WHOLE_PEAK:
+        return ""
+    return f", with {100.0 * cut:.0f} % of the peak cut off (at most {TORQUE.text(most)} of {TORQUE.text(largest)})"
 
 
 def cut_error(problem: SizingProblem, pressure: float) -> float:
@@ -567,6 +581,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
         f"at most {TORQUE.text(problem.largest_error)}, {100 * problem.reserve:.0f} % of the gas as reserve"
     )
     remarks = [f"{sized.name}: {sized.remark}" for sized in sizing.valves if sized.remark]
+    colours = dict(zip(problem.valves, cycle(COLOURS), strict=False))
     return Finding(
         name="design",
         kicker="Sizing study",
@@ -577,7 +592,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
             Section(remarks=(sizing.summary, *remarks)),
             Section(
                 "Error and gas over pressure",
-                panels=partial(_pressure_panels, sizing),
+                panels=partial(_pressure_panels, sizing, colours),
                 name="profile",
                 caption="Every valve over supply pressure; each dot has the gains that use least gas within the error "
                 "limit. Rings mark the chosen pressures.",
@@ -587,7 +602,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
             ),
             Section(
                 "The torque",
-                panels=partial(_torque_panels, sizing),
+                panels=partial(_torque_panels, sizing, colours),
                 name="torque",
                 caption="The prescribed torque and the suggestion's.",
                 size=(5.8, 2.5),
@@ -633,15 +648,9 @@ def _tables(sizing: Sizing) -> tuple[Section, Section]:
     )
 
 
-def _colours(sizing: Sizing) -> dict[str, str]:
-    """Return the colour of each valve's curves by name."""
-    return dict(zip(sizing.problem.valves, cycle(COLOURS), strict=False))
-
-
-def _pressure_panels(sizing: Sizing) -> list[Panel]:
+def _pressure_panels(sizing: Sizing, colours: Mapping[str, str]) -> list[Panel]:
     """Return panels of error and gas over supply pressure, with a ring at the pressure chosen for each valve."""
     limit = sizing.problem.largest_error
-    colours = _colours(sizing)
     dotted = {"marker": ".", "markersize": 4}
     ringed = {"linestyle": "", "marker": "o", "markersize": 9, "markerfacecolor": "none", "markeredgewidth": 1.4}
     errors = [Mark("level", (), limit, colour=BLACK, style={"linewidth": 1.0, "linestyle": "--"})]
@@ -675,7 +684,7 @@ def _pressure_panels(sizing: Sizing) -> list[Panel]:
     ]
 
 
-def _torque_panels(sizing: Sizing) -> list[Panel]:
+def _torque_panels(sizing: Sizing, colours: Mapping[str, str]) -> list[Panel]:
     """Return the panel of the prescribed torque and of the suggestion's over time."""
     times = np.linspace(0.0, sizing.problem.scenario.run.duration, 3001)
     choice = sizing.choice
@@ -683,6 +692,7 @@ def _torque_panels(sizing: Sizing) -> list[Panel]:
     marks = [Mark("line", times, sizing.problem.profile.at(times), (), "prescribed", REFERENCE.colour, prescribed)]
     if choice is not None and sizing.recording is not None:
         label = f"{choice.name} at {PRESSURE.number(choice.pressure, '.3g')} {PRESSURE.axis_unit}"
-        colour = _colours(sizing)[choice.name]
-        marks.append(Mark("line", sizing.recording.time, sizing.recording["torque"], label=label, colour=colour))
+        marks.append(
+            Mark("line", sizing.recording.time, sizing.recording["torque"], label=label, colour=colours[choice.name])
+        )
     return [Panel(TIME, TORQUE, marks, then=lambda axes: axes.margins(x=0.0))]
