@@ -40,7 +40,7 @@ from ppafo.studies.intervals import (
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, difference_of, level_of
 from ppafo.studies.loading import drawn_in, list_studies, load_study, read_source, study_of
 from ppafo.studies.study import DEFAULT_SEED, Configuration, configurations_with
-from ppafo.studies.varying import VariedPath, distribution_in, value_at, varied_path
+from ppafo.studies.varying import VariedPath, distribution_in, left_out, value_at, varied_path
 from ppafo.study.blocks import unvaried
 from ppafo.study.executing import executor_of
 from ppafo.study.runs import (

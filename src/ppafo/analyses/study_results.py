@@ -250,6 +250,7 @@ def summarise(study: Study, results: StudyResults) -> StudyResults:
             for each in study.configurations
             if each.scenario.follows_reference or tracking[each.name].without_verdict < completed[each.name]
         },
+        "remarks": ask.left_out(study),
         "failures": failures,
         "configurations": {
             name: {
@@ -357,6 +358,7 @@ def finding_of(results: StudyResults) -> ask.Finding[StudyResults]:
     # With fewer than half of the runs, the median would be that of the failed ones.
     useless = [name for name, count in completed.items() if 2 * count < runs]
     said += [f"{name}: most runs failed: the statistics of the others do not describe the study" for name in useless]
+    said += summary.get("remarks", ())
     rows = []
     for number in study.get("vary", ()):
         keys = (f"{key.replace('_', ' ')} {value}" for key, value in number.items() if key not in ("path", "kind"))

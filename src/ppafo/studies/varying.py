@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,9 +19,9 @@ from ppafo.simulation.numbers import NOISE_SEED, declared_numbers, number_at
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.studies.declaration import KINDS
 from ppafo.studies.distributions import Distribution
-from ppafo.studies.study import Axis, RandomValue
+from ppafo.studies.study import Axis, RandomValue, Study
 from ppafo.units import parse_quantity, split_pressure_kind, split_quantity
-from ppafo.units.shown import shown_unit, shown_value
+from ppafo.units.shown import shown_text, shown_unit, shown_value
 from ppafo.wording import nearest_name
 
 _UNIT_OF_DIFFERENCE = {"Pa_a": "Pa_d"}
@@ -31,6 +32,8 @@ _STATED_DIFFERENCES = {"psi_g": "psi_d", "psi_a": "psi_d", "degC": "K", "°C": "
 # Range of magnitudes that are displayed in the unit in which they were given.
 _SMALLEST_SHOWN = 1.0e-3
 _LARGEST_SHOWN = 1.0e7
+_TAIL = 1.0e-3
+"""Probability of a draw below those that are told, and of one above them [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +113,26 @@ def varied_path(
         raise UnitError(f"the atmosphere varies, so '{units[0]}' and '{other}' cannot be mixed")
     atmosphere = fixed_zero(path) or scenario.device.supply.atmospheric_pressure
     return VariedPath(path, quantity, atmosphere, is_gauge, given if is_plain and fits(given, quantity.unit) else "")
+
+
+def left_out(study: Study) -> list[str]:
+    """Remarks on drawn paths whose values all lie on one side of the value that a scenario of the study has."""
+    remarks = []
+    for drawn in study.drawn:
+        low, high = drawn.distribution.values(np.array([_TAIL, 1.0 - _TAIL])).tolist()
+        unit = study.units[drawn.path]
+        shown = partial(shown_text, si_unit=unit, unit=study.given.get(drawn.path, ""))
+        for configuration in study.configurations:
+            supply = configuration.scenario.device.supply
+            zero = supply.atmospheric_pressure if drawn.path in study.gauge else 0.0
+            nominal = value_at(drawn.path, configuration.scenario)
+            varies = configuration.name in study.only.get(drawn.path, (configuration.name,))
+            if varies and nominal is not None and not low <= nominal - zero <= high:
+                remarks.append(
+                    f"{configuration.name}: {drawn.path} is drawn from {shown(low + zero)} to {shown(high + zero)}, "
+                    f"which leaves out its value, {shown(nominal)}"
+                )
+    return remarks
 
 
 def value_at(path: str, scenario: Scenario) -> float | None:

@@ -14,6 +14,7 @@ from ppafo.simulation.ensemble.planning import check_columns
 from ppafo.studies.draws import uncertainty_of
 from ppafo.studies.loading import load_study
 from ppafo.studies.study import Study
+from ppafo.studies.varying import left_out
 from ppafo.study.blocks import drawn_values, varied_columns
 from ppafo.units import to_si
 
@@ -113,3 +114,14 @@ def test_a_condition_of_find_counts_from_the_atmosphere_of_the_scenario() -> Non
     assert found.limit == pytest.approx(130.0e3)
     with pytest.raises(StudyError, match=REFUSED):
         ppafo.find(TASK, vary=f"{ATMOSPHERE}=70..90 kPa_a", such_that=f"{METRIC} <= 50 kPa_g", overrides=HIGH_UP)
+
+
+@pytest.mark.parametrize(("mean", "count"), [("70 psi_g", 1), ("55 psi_g", 0)])
+@pytest.mark.parametrize("rooms", [(), (ROOMS,)])
+def test_draws_that_leave_out_the_value_of_the_scenario_are_told(
+    mean: str, count: int, rooms: tuple[dict[str, Any], ...]
+) -> None:
+    pressure = {"path": "supply.pressure", "kind": "normal", "mean": mean, "standard_deviation": "2 psi_d"}
+    told = left_out(study(pressure, *rooms, sample={"method": "random", "runs": 8}))
+    assert len(told) == count
+    assert all("which leaves out its value, 55 psi_g" in text for text in told)
