@@ -97,7 +97,9 @@ def test_the_python_controller_of_the_page_controls(capsys: pytest.CaptureFixtur
     assert capsys.readouterr().out == "64\n"
 
 
-HOLDS, FILLS_1, FILLS_2 = (0.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 1.0, 0.0)
+HOLDS = (0.0, 0.0, 0.0, 0.0)
+FILLS_1 = (1.0, 0.0, 0.0, 1.0)
+FILLS_2 = (0.0, 1.0, 1.0, 0.0)
 VENTS = (0.0, 1.0, 0.0, 1.0)
 
 
@@ -123,8 +125,10 @@ def test_a_valve_does_with_a_command_what_the_page_says(kind: str, command: floa
 
 
 def test_the_controller_of_the_page_keeps_its_command_inside_the_band(hysteresis: ModuleType) -> None:
-    parameters, state = hysteresis.HysteresisParameters(0.3), hysteresis.HysteresisState(1.0)
-    inside, above = Measurement(1.3, 1e5, 1e5, 2.2), Measurement(1.3, 1e5, 1e5, 2.4)
+    parameters = hysteresis.HysteresisParameters(0.3)
+    state = hysteresis.HysteresisState(1.0)
+    inside = Measurement(1.3, 1e5, 1e5, 2.2)
+    above = Measurement(1.3, 1e5, 1e5, 2.4)
     assert hysteresis.update(parameters, state, 2.0, inside, 1e-3)[0] == 1.0
     assert hysteresis.update(parameters, state, 2.0, above, 1e-3)[0] == -1.0
 
@@ -163,7 +167,8 @@ def elbow(tmp_path: Path) -> Path:
     The values of the second chamber are left out.
     """
     shipped = (files("ppafo.parameters") / "sets" / "cylinder-lever.toml").read_text(encoding="utf-8")
-    before, after = shipped.index("[actuator]"), shipped.index("[actuator.angle_min]")
+    before = shipped.index("[actuator]")
+    after = shipped.index("[actuator.angle_min]")
     sections = re.split(r"^(?=\[)", shipped[after:], flags=re.MULTILINE)
     kept = "".join(text for text in sections if text[1:].partition("]")[0] not in OF_SECOND_CHAMBER)
     (tmp_path / "mine.toml").write_text(shipped[:before] + extension('kind = "table"') + "\n" + kept, encoding="utf-8")
@@ -207,7 +212,8 @@ def test_the_actuator_of_the_page_pulls_as_its_catalogue_prints_by_entry_point_a
         text = shipped.replace('kind = "muscle_pair"', f'kind = "{kind}"')
         actuator = build_device(parse_parameter_set(text.encode(), "mine.toml")).actuator
         assert actuator.kind == kind
-        thread, turns = actuator.thread_length, actuator.turns
+        thread = actuator.thread_length
+        turns = actuator.turns
         # Chou and Hannaford, F = p b^2 (3 cos^2 - 1)/(4 pi n^2), at the nominal length; 40 mm has four times the area.
         cosine = 0.2 / thread
         force = 6.0e5 * thread**2 * (3.0 * cosine**2 - 1.0) / (4.0 * math.pi * turns**2)

@@ -25,7 +25,8 @@ SPRING = "effects.joint_load.stiffness=5 N m/rad"
 @pytest.fixture(autouse=True)
 def _installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The package of the page, as an installer leaves it."""
-    module, entry_points = block_with(PAGE, "LOAD = Effect"), block_with(PAGE, "ppafo.effects")
+    module = block_with(PAGE, "LOAD = Effect")
+    entry_points = block_with(PAGE, "ppafo.effects")
     write_package(tmp_path / "site", "my_loads.fan", module, entry_points)
     monkeypatch.syspath_prepend(tmp_path / "site")
     yield

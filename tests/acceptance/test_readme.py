@@ -22,8 +22,9 @@ ASKED, MEASURED_PAGE, STUDIES_PAGE = (
     for name in ("what-you-can-ask.md", "evidence.md", "the-paper.md")
 )
 TEXT = "\n".join((README, ASKED, MEASURED_PAGE))
-MOST_LINES, MOST_WORDS = 80, 600
-"""What the README may have: five minutes to read."""
+# What the README may have: five minutes to read.
+MOST_LINES = 80
+MOST_WORDS = 600
 CHECK_FAILED = 1
 
 
@@ -141,10 +142,8 @@ def test_the_answers_of_the_five_minutes_are_those_of_runs() -> None:
             ("torque-task-solenoid", ()),
         )
     )
-    error, gas = (
-        (lambda metrics: f"{metrics['rms_error'].value:.3g}"),
-        (lambda m: f"{1e3 * m['gas_supplied'].value:.3g}"),
-    )
+    error = lambda metrics: f"{metrics['rms_error'].value:.3g}"
+    gas = lambda m: f"{1e3 * m['gas_supplied'].value:.3g}"
     assert f"{error(first)} N m, {gas(first)} g" in lines["1"]
     assert f"{error(more)} N m, {gas(more)} g" in lines["2"]
     assert f"{error(pair)} and {error(first)} N m, {gas(pair)} and {gas(first)} g" in lines["3"]

@@ -52,7 +52,8 @@ class FinishedRun:
 def ran(tmp_path_factory: pytest.TempPathFactory) -> FinishedRun:
     """A run that the tests below only read."""
     folder = tmp_path_factory.mktemp("reproduce") / "out"
-    said, progress = io.StringIO(), io.StringIO()
+    said = io.StringIO()
+    progress = io.StringIO()
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(progress):
         assert main(["reproduce", "--out", str(folder)]) == 0
     return FinishedRun(folder, said.getvalue(), progress.getvalue())

@@ -25,7 +25,8 @@ def words_of(target: str) -> list[str]:
 
 @needs_make
 def test_make_test_leaves_out_what_is_long_and_make_test_all_nothing() -> None:
-    short, everything = words_of("test"), words_of("test-all")
+    short = words_of("test")
+    everything = words_of("test-all")
     assert [word for word in short if word not in everything] == ["-m", "not long"]
     assert [word for word in everything if word not in short] == []
 

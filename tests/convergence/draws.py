@@ -103,7 +103,8 @@ def random_scenario(seed: int) -> Scenario:
         )
     device = random_device(chance, experiment)
     base = load_scenario(f"torque-task-{experiment}")
-    level, ramp_time = chance.uniform(3.0, 7.0), chance.uniform(0.3, 1.0)
+    level = chance.uniform(3.0, 7.0)
+    ramp_time = chance.uniform(0.3, 1.0)
     angle = math.radians(chance.choice([50.0, 75.0, 100.0]))
     return dataclasses.replace(
         base,

@@ -59,7 +59,9 @@ class Kept(NamedTuple):
 def away_from_impacts(scenario: Scenario, recording: Recording) -> Any:
     """True for samples with no impact within 5 ms."""
     actuator = scenario.device.actuator
-    angle, rate, span = recording["angle"], recording["angular_velocity"], actuator.angle_max - actuator.angle_min
+    angle = recording["angle"]
+    rate = recording["angular_velocity"]
+    span = actuator.angle_max - actuator.angle_min
     distance = np.minimum(angle - actuator.angle_min, actuator.angle_max - angle)
     rests = distance < 1.0e-9 * span
     comes_or_goes = rests[1:] != rests[:-1]
@@ -81,7 +83,8 @@ def kept(scenario: Scenario) -> Kept:
     if failures:
         return Kept(0.0, 0.0, 0.0, np.inf, failures[0])
     usual, truth, *doubtful = (result.recording for result in results)
-    actuator, supply = scenario.device.actuator, scenario.device.supply
+    actuator = scenario.device.actuator
+    supply = scenario.device.supply
     outside = [supply.pressure, supply.dorsiflexion_pressure, supply.atmospheric_pressure]
     pressures = np.concatenate([truth["pressure_1"], truth["pressure_2"], outside])
     if pressures.max() - supply.atmospheric_pressure > LARGEST_PRESSURE * (max(outside) - supply.atmospheric_pressure):

@@ -29,7 +29,8 @@ def _walls(chance: Chance) -> Document:
 def smooth_shanks(chance: Chance) -> Document:
     """A foot on a shank along cubic curves through three to eight knots, whose acceleration jumps at each."""
     period = chance.uniform(0.2, 1.2)
-    knots, reach = chance.randint(3, 8), chance.uniform(5.0, 40.0)
+    knots = chance.randint(3, 8)
+    reach = chance.uniform(5.0, 40.0)
     shank = {"kind": "smooth", "period": f"{period} s", "value_01": f"{chance.uniform(-reach, reach)} deg"}
     for number in range(2, knots + 1):
         place = (number - 1 + chance.uniform(-0.3, 0.3)) / knots

@@ -29,7 +29,8 @@ SQUEEZED = (
 
 def supplied_gas(run: Run) -> np.ndarray:
     """Gas [kg] drawn from the supply at every record, of a run that agrees with the reference solver in everything."""
-    outcome, reference = run_batch(batch_of(run)), solve_reference(run)
+    outcome = run_batch(batch_of(run))
+    reference = solve_reference(run)
     agreement = measure_agreement(run, outcome, reference)
     assert agreement.angle <= LARGEST_ANGLE, agreement
     assert agreement.worst_pressure <= LARGEST_PRESSURE, agreement

@@ -25,7 +25,10 @@ K = 1.3
 PRODUCT = 8.314 * 298.0 / 0.044
 CHOKED = math.sqrt(K / PRODUCT * (2.0 / (K + 1.0)) ** ((K + 1.0) / (K - 1.0)))
 CONDUCTANCE = 0.113 * 31.6e-6 * CHOKED
-PER_ANGLE, DEAD, LOWEST, HIGHEST = 51e-6, 2e-6, math.radians(20.0), math.radians(130.0)
+PER_ANGLE = 51e-6
+DEAD = 2e-6
+LOWEST = math.radians(20.0)
+HIGHEST = math.radians(130.0)
 HELD = DEAD + PER_ANGLE * math.radians(55.0)
 RATE = CONDUCTANCE * PRODUCT / HELD
 VOLUMES = (
@@ -84,7 +87,8 @@ def test_choked_filling_raises_the_pressure_along_a_line(
     course: Simulator, gas: tuple[str, ...], exponent: float
 ) -> None:
     """P = P_0 + a P_source t; k times as fast where no wall takes the heat of the gas that comes in."""
-    source, start = 800_000.0, 101_325.0
+    source = 800_000.0
+    start = 101_325.0
     found = course(held(1.0, start, 0.027, f"supply.pressure={source} Pa_a", *gas))
     expected = start + exponent * RATE * source * found["time"]
     assert 3.0 * start < expected[-1] < 0.5457 * source
@@ -136,16 +140,20 @@ def test_decay_with_coulomb_and_viscous_friction_stops_when_and_where_it_should(
     course: Simulator, damping: float
 ) -> None:
     """I omega' = -beta omega - T_d: an exponential that ends at I/beta ln(1 + beta omega_0/T_d), or a parabola."""
-    inertia, dynamic, speed = 8.4e-3, 0.03, 1.0
+    inertia = 8.4e-3
+    dynamic = 0.03
+    speed = 1.0
     lines = ("actuator.torque_constant=1e-18 m^3", f"friction.dynamic_torque={dynamic} N m")
     found = course(thrown(60.0, speed, 0.4, *lines, f"friction.viscous_damping={damping} N m s/rad"))
     end = inertia * speed / dynamic
     if damping > 0.0:
         end = inertia / damping * math.log1p(damping * speed / dynamic)
     time = np.minimum(found["time"], end)
-    velocity, path = speed - dynamic / inertia * time, speed * time - 0.5 * dynamic / inertia * time**2
+    velocity = speed - dynamic / inertia * time
+    path = speed * time - 0.5 * dynamic / inertia * time**2
     if damping > 0.0:
-        tail, rate = dynamic / damping, damping / inertia
+        tail = dynamic / damping
+        rate = damping / inertia
         velocity = (speed + tail) * np.exp(-rate * time) - tail
         path = -(speed + tail) * np.expm1(-rate * time) / rate - tail * time
     assert 0.1 < end < 0.35

@@ -26,7 +26,9 @@ TABLE = tuple(
     for number, node in enumerate(((0.05, 0.0), (0.3, 0.1), (0.5, 0.1), (0.8, 0.9)), 1)
     for name, value in zip(("command", "opening"), node, strict=True)
 )
-STEP, PAIR, SPOOL = "step-response", "torque-task-solenoid", "torque-task-proportional"
+STEP = "step-response"
+PAIR = "torque-task-solenoid"
+SPOOL = "torque-task-proportional"
 CASES = (
     *((STEP, SEALS), (STEP, STRIBECK), (PAIR, (*SEALS, *STRIBECK, *FREE))),
     *((STEP, (*LINE, "run.duration=0.5 s")), (PAIR, (*LINE, *FREE))),
@@ -51,7 +53,9 @@ def test_every_effect_is_among_the_cases_but_those_of_stops_loads_and_sensors_wh
 
 
 def test_a_column_of_an_effect_has_the_bits_of_the_single_runs_and_changes_them() -> None:
-    path, values, metrics = LINE[0].partition("=")[0], (0.0, 5e-6, 1e-5), ("gas_vented", "gas_supplied")
+    path = LINE[0].partition("=")[0]
+    values = (0.0, 5e-6, 1e-5)
+    metrics = ("gas_vented", "gas_supplied")
     found = run_ensemble(load_scenario(STEP, FREE[1:]), {path: np.array(values)}, metrics).metrics
     for place, value in enumerate(values):
         alone = simulate(load_scenario(STEP, (*FREE[1:], f"{path}={value} m^2"))).metrics

@@ -33,7 +33,8 @@ def _ice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.mark.usefixtures("_ice")
 def test_a_state_that_acts_on_the_gas_leaves_the_step_its_second_order() -> None:
-    reference, errors = None, []
+    reference = None
+    errors = []
     for step in ("2 ms", "0.25 ms"):
         run = plan_run(load_scenario("torque-task-proportional", (*VENTING, *ICE, f"run.step={step}")))
         whole = replace(run, needs_parts=False)
@@ -49,7 +50,8 @@ def test_the_error_of_a_state_shortens_steps() -> None:
     )
     *others, ice = run.program.effects
     assert ice.state is not None
-    reference, errors = solve_reference(run), []
+    reference = solve_reference(run)
+    errors = []
     for tolerances in ((), (1e-6,)):
         effect = replace(ice, state=replace(ice.state, tolerances=tolerances))
         own = replace(run, program=replace(run.program, effects=(*others, effect)))

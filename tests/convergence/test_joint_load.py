@@ -67,6 +67,7 @@ def test_the_torque_that_prescribes_a_motion_has_the_load_in_it() -> None:
         simulate(load_scenario("torque-task-moving-ankle", (*texts, *more))).recording
         for more in ((), settings(0.05, 5.0, 0.0))
     )
-    angle, rate = without["angle"], without["angular_velocity"]
+    angle = without["angle"]
+    rate = without["angular_velocity"]
     taken = 0.05 * rate * np.abs(rate) + 5.0 * (angle - 0.5 * math.pi)
     assert without["external_torque"] - loaded["external_torque"] == pytest.approx(taken, abs=1e-12)

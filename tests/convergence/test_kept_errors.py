@@ -8,7 +8,8 @@ from ppafo.simulation.loading import scenario_from_dict
 from tests.convergence.kept_errors import kept
 from tests.convergence.tasks import TASKS, task
 
-SEED, DRAWS = 1, 8
+SEED = 1
+DRAWS = 8
 
 
 @pytest.mark.long

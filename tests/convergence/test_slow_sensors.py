@@ -51,7 +51,8 @@ def test_what_fades_in_a_step_is_the_exponential_and_its_mean_however_long_the_s
 
 
 def test_a_slow_angle_sensor_shows_a_sine_smaller_and_later_and_the_others_show_the_truth() -> None:
-    bandwidth, frequency = 5.0, 4.0
+    bandwidth = 5.0
+    frequency = 4.0
     scenario = load_scenario(
         "torque-task-proportional", (f"sensors.angle_bandwidth={bandwidth} Hz", "run.duration=2 s")
     )

@@ -78,7 +78,8 @@ def compressed(step: float) -> float:
 
 
 def test_adiabatic_compression_follows_the_isentrope_with_order_two() -> None:
-    coarse, fine = compressed(2.0e-3), compressed(1.0e-3)
+    coarse = compressed(2.0e-3)
+    fine = compressed(1.0e-3)
     assert fine < 2.0e-4
     assert 3.5 < coarse / fine < 4.5
 
@@ -98,7 +99,9 @@ def test_warm_walls_make_the_gas_isothermal(name: str) -> None:
             )
         )
 
-    far, near, nearest = difference(0.0), difference(1.0e6), difference(1.0e8)
+    far = difference(0.0)
+    near = difference(1.0e6)
+    nearest = difference(1.0e8)
     assert nearest < 20.0 < 0.01 * far
     assert nearest < near < far
 

@@ -45,7 +45,8 @@ def bladder(_folder: Path) -> Case:
 
 def soft_case(folder: Path, chambers: int) -> Case:
     """A soft actuator that begins in the middle of its range."""
-    base, given = EXAMPLES / "step-response-measured-bladder.toml", soft(folder, chambers)
+    base = EXAMPLES / "step-response-measured-bladder.toml"
+    given = soft(folder, chambers)
     more = ["motion.angle=60 deg", "run.duration=0.25 s", *(["initial.pressure_2=40 psi_g"] if chambers == 2 else [])]
     scenario = load_scenario(base, [*WARM, given, *more])
     return scenario, BladderJoint(scenario, folder / "soft.csv")
@@ -61,8 +62,10 @@ CASES: dict[str, Callable[[Path], Case]] = {
 
 def gaps(scenario: Scenario, joint: Joint) -> tuple[float, float, float]:
     """Largest gap of the angle over its range, of both pressures over theirs, and of the gas drawn over all of it."""
-    record, answer = simulate(scenario).recording, independent_run(scenario, joint=joint)
-    actuator, supply = scenario.device.actuator, scenario.device.supply
+    record = simulate(scenario).recording
+    answer = independent_run(scenario, joint=joint)
+    actuator = scenario.device.actuator
+    supply = scenario.device.supply
     pressures = [name for name in ("pressure_1", "pressure_2") if name in record]
     pressed = max(float(np.abs(record[name] - getattr(answer, name)).max()) for name in pressures)
     turned = float(np.abs(record["angle"] - answer.angle).max())
@@ -120,7 +123,8 @@ def squeezed(folder: Path, step: float) -> float:
 
 
 def test_a_closed_chamber_that_gives_follows_the_isentrope_with_order_two(tmp_path: Path) -> None:
-    coarse, fine = squeezed(tmp_path, 2.0e-3), squeezed(tmp_path, 1.0e-3)
+    coarse = squeezed(tmp_path, 2.0e-3)
+    fine = squeezed(tmp_path, 1.0e-3)
     assert fine < 2.0e-4
     assert 3.5 < coarse / fine < 4.5
 
@@ -136,8 +140,10 @@ def held(folder: Path, *more: str) -> Scenario:
 
 def test_what_enters_a_held_chamber_is_energy_of_its_gas_and_work_on_its_wall(tmp_path: Path) -> None:
     result = simulate(held(tmp_path, *ADIABATIC, "controller.kind=constant", "controller.command=1"))
-    record, run = result.recording, plan_run(result.scenario)
-    pressure, other = record["pressure_1"], record["pressure_2"]
+    record = result.recording
+    run = plan_run(result.scenario)
+    pressure = record["pressure_1"]
+    other = record["pressure_2"]
     volume = filled_chambers(run.program.actuator, run.plant, record["angle"], pressure, other).volume_1
     # The wall gives in proportion to the pressure from one measured pressure to the next: few terms are exact.
     grid = np.linspace(pressure[0], pressure[-1], 20001)

@@ -23,8 +23,9 @@ ROOT = Path(__file__).parents[2]
 BLADDER = ROOT / "tests" / "actuators" / "measured-bladder.toml"
 MUSCLES = ROOT / "src" / "ppafo" / "examples" / "add-an-actuator" / "muscle-pair.toml"
 
-VANE_BASE, WALK_BASE = "torque-task-proportional", "proportional"
-"""What a feature is added to."""
+# What a feature is added to.
+VANE_BASE = "torque-task-proportional"
+WALK_BASE = "proportional"
 Texts = tuple[str, ...]
 
 BASES: dict[str, Texts] = {

@@ -27,7 +27,8 @@ from scripts.instances import Instance
 from tests.built_once import shared_library
 from tests.doors.of_python import Floats
 
-ATMOSPHERE, ROOM = "supply.atmospheric_pressure", "93 kPa_a"
+ATMOSPHERE = "supply.atmospheric_pressure"
+ROOM = "93 kPa_a"
 SAMPLES = 30
 BASES = {
     "regulators": (
@@ -95,7 +96,8 @@ def test_a_row_has_the_numbers_of_the_single_run(name: str) -> None:
     for varied in each_of(name):
         plan = plan_ensemble(check_columns(varied.base, varied.columns))
         assert not plan.reasons, (varied.given, plan.reasons)
-        ((_, row),), alone = plan.batches, batch_of(plan_run(varied.single))
+        ((_, row),) = plan.batches
+        alone = batch_of(plan_run(varied.single))
         np.testing.assert_array_equal(row.parameters, alone.parameters, err_msg=str(varied.given))
         np.testing.assert_array_equal(row.states, alone.states, err_msg=str(varied.given))
 
@@ -105,7 +107,8 @@ def test_a_library_and_a_unit_have_the_bits_of_the_single_run(name: str, tmp_pat
     first, *_ = each = each_of(name)
     for file, content in c_library(first.base).items():
         (tmp_path / file).write_bytes(content)
-    own, exported = c_identifier(first.base.name), library_of(first.base)
+    own = c_identifier(first.base.name)
+    exported = library_of(first.base)
     library = ctypes.CDLL(str(shared_library(tmp_path / f"{own}.c", "-O0", "-ffp-contract=off")))
     library[f"{own}_size"].restype = ctypes.c_size_t
     ((file, content),) = functional_unit(closed_loop(first.base), 2, ["linux64"]).items()
@@ -119,7 +122,8 @@ def test_a_library_and_a_unit_have_the_bits_of_the_single_run(name: str, tmp_pat
             settings[place] = given.get(setting.path, settings[place])
         memory = (ctypes.c_double * (library[f"{own}_size"](settings) // 8 + 1))()
         library[f"{own}_initialise"](memory, settings)
-        unit, outputs = Instance(str(tmp_path / file), given), np.zeros(1 + len(exported.program.outputs))
+        unit = Instance(str(tmp_path / file), given)
+        outputs = np.zeros(1 + len(exported.program.outputs))
         for sample in range(1, SAMPLES):
             library[f"{own}_step"](memory)
             unit.go_to(float(recording.time[sample]))

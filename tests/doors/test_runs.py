@@ -39,7 +39,8 @@ VARIED = "supply.pressure"
 
 @pytest.mark.parametrize("case", parameters())
 def test_compiled_code_has_the_bits_of_python(case: Case) -> None:
-    answer, found = python_answer(case), answer_of(compiled_result(case))
+    answer = python_answer(case)
+    found = answer_of(compiled_result(case))
     assert found.ended == answer.ended
     assert found.time.tobytes() == answer.time.tobytes()
     assert list(found.channels) == list(answer.channels)
@@ -52,7 +53,8 @@ class OfKind:
 
     def __init__(self, law: ControllerKind, scenario: Scenario) -> None:
         settings = scenario.controller.settings
-        self.law, self.period = law, scenario.controller.period
+        self.law = law
+        self.period = scenario.controller.period
         self.parameters = rebuilt(law.parameters, (settings[item.name] for item in law.quantities))
 
     def reset(self) -> None:
@@ -87,7 +89,8 @@ def of_ensembles() -> list[Any]:
 @pytest.mark.parametrize("case", of_ensembles())
 def test_a_run_of_an_ensemble_has_the_bits_of_the_run_alone(case: Case) -> None:
     """Among others, of which one has another supply; those of short vanes are run by Python, which is quick enough."""
-    answer, scenario = python_answer(case), scenario_of(case)
+    answer = python_answer(case)
+    scenario = scenario_of(case)
     # What follows torques is measured of a walk too, but is not among the metrics of one.
     metrics = [name for name in offered(scenario) if name in answer.metrics or not case.walks]
     bands = [name for name in TRACED if name in answer.channels]

@@ -59,7 +59,8 @@ def damaged(text: str, changes: list[Change]) -> bytes:
         number = place % len(lines)
         line = lines[number]
         key, equals, value = line.partition("=")
-        middle, letter = len(line) // 2, place % (len(line) + 1)
+        middle = len(line) // 2
+        letter = place % (len(line) + 1)
         lines[number] = {
             "value": f"{key}= {new}" if equals else line,
             "unit": re.sub(r'"([-+0-9.e]+)[^"]*"', lambda found, new=new: f'"{found[1]} {new}"', line),

@@ -16,7 +16,8 @@ SERVO = ("device.valve=pressure_regulator",)
     ("name", "texts"), [("proportional", ("run.duration=6 s",)), ("cylinder-servo", SERVO), ("pressure-loop", ())]
 )
 def test_rows_far_out_of_range_are_refused_by_name_and_the_others_are_kept(name: str, texts: tuple[str, ...]) -> None:
-    base, draw = load_scenario(name, texts), np.random.default_rng(108)
+    base = load_scenario(name, texts)
+    draw = np.random.default_rng(108)
     declared = declared_numbers(base)
     numbers = {path: value_at(path, base) for path in declared}
     tried = {path: number for path, number in numbers.items() if number is not None}

@@ -24,7 +24,8 @@ def test_a_filled_drop_out_is_found_where_it_covers_the_strides(seed: int, start
     values = moving(seed, 0.0)
     inside = np.flatnonzero((start <= TIME) & (start + length >= TIME))
     values[inside] = values[inside[0]]
-    first, last = float(TIME[inside[0]]), float(TIME[inside[-1]])
+    first = float(TIME[inside[0]])
+    last = float(TIME[inside[-1]])
     covered = sum(max(0.0, min(last, high) - max(first, low)) for low, high in SPANS)
     assert constant_stretches(TIME, values, SPANS) == ([(first, last)] if covered > LONGEST_HELD else [])
 

@@ -96,7 +96,8 @@ def test_the_recording_that_is_damaged_is_taken_as_it_is(tmp_path: Path, kind: s
 def test_a_damaged_recording_gives_numbers_or_one_line(
     tmp_path: Path, kind: str, place: float, length: int, cell: str, through_map: bool
 ) -> None:
-    path, text = tmp_path / "bench.csv", TABLES[kind]
+    path = tmp_path / "bench.csv"
+    text = TABLES[kind]
     start = int(place * (len(text) - 1))
     path.write_text(text[:start] + cell + text[start + length :], encoding="utf-8")
     try:

@@ -46,7 +46,8 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("name", ["study.json", "summary.json", "bands.parquet", "runs/chunk-0000001.parquet"])
 def test_damage_is_one_line(name: str, results: Path) -> None:
-    file, draw = results / name, random.Random(name)
+    file = results / name
+    draw = random.Random(name)
     content = file.read_bytes()
     refused = 0
     try:

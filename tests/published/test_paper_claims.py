@@ -35,7 +35,8 @@ def test_the_torque_task_meets_the_printed_numbers_over_the_phase_of_its_decisio
 def test_improvement_and_saving_of_the_run_as_completed_are_in_the_ranges(
     reproduction: Reproduction, claims: dict[str, Claim]
 ) -> None:
-    solenoid, proportional = reproduction.solenoid.metrics, reproduction.proportional.metrics
+    solenoid = reproduction.solenoid.metrics
+    proportional = reproduction.proportional.metrics
     names = {"torque_rms_improvement": "rms_error", "co2_saving": "gas_supplied"}
     for identifier, metric in names.items():
         own = 100.0 * (1.0 - proportional[metric].value / solenoid[metric].value)

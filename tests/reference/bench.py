@@ -43,21 +43,25 @@ class Bench:
 
     def leak(self, pressure_1: float, pressure_2: float) -> float:
         """Flow from chamber 1 to chamber 2 [kg/s]."""
-        high, low = max(pressure_1, pressure_2), min(pressure_1, pressure_2)
+        high = max(pressure_1, pressure_2)
+        low = min(pressure_1, pressure_2)
         size = float(flow(high, low, 1.0, self.rig.leak, self.rig.linear))
         return size if pressure_1 >= pressure_2 else -size
 
     def drive(self, y: Any) -> float:
         """Torque before friction and damping [N m]."""
-        rig, (pressure_1, pressure_2) = self.rig, self.pressures(y)
+        rig = self.rig
+        pressure_1, pressure_2 = self.pressures(y)
         return float(rig.torque_constant * (pressure_1 - pressure_2) + rig.gravity * math.sin(y[0]) - rig.external)
 
     def rates(self, y: Any, way: float, opening: float) -> list[float]:
         """Time derivatives of the unknowns."""
-        rig, (pressure_1, pressure_2) = self.rig, self.pressures(y)
+        rig = self.rig
+        pressure_1, pressure_2 = self.pressures(y)
         velocity = y[1] if way != 0.0 else 0.0
         torque = self.drive(y) - rig.viscous * velocity - way * rig.dynamic
-        to_1, to_2 = min(max(opening, 0.0), 1.0), min(max(-opening, 0.0), 1.0)
+        to_1 = min(max(opening, 0.0), 1.0)
+        to_2 = min(max(-opening, 0.0), 1.0)
         into_1 = self.between(pressure_1, rig.source_1, to_1) + self.between(pressure_1, rig.room, to_2)
         into_2 = self.between(pressure_2, rig.source_2, to_2) + self.between(pressure_2, rig.room, to_1)
         leaked = self.leak(pressure_1, pressure_2)
@@ -87,7 +91,8 @@ def bench(scenario: Scenario, commands: Sequence[tuple[float, float]], times: An
         y[2 + n] = pressure * volumes[n] / product
     seen = np.empty((3, len(times)))
     ends = [time for time, _ in commands[1:]] + [float(times[-1]) + 1.0e-6]
-    now, way = 0.0, 0.0
+    now = 0.0
+    way = 0.0
     for (begin, opening), end in zip(commands, ends, strict=True):
         now = max(now, begin) if begin > 0.0 else 0.0
         while now < end - 1.0e-12:
@@ -115,7 +120,8 @@ def events_of(made: Bench, way: float) -> list[Any]:
 
     events: list[Any] = [breaks] if way == 0.0 else [stands, stops]
     for event in events:
-        event.terminal, event.direction = True, 1.0 if event is breaks else -1.0
+        event.terminal = True
+        event.direction = 1.0 if event is breaks else -1.0
     return events
 
 

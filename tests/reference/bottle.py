@@ -69,7 +69,8 @@ def content(gas: Fluid, temperature: float, mass: float, volume: float) -> float
 def orifice(area: float, up: float, down: float, warmth: float, constant: float, k: float) -> float:
     """Equation (6): flow [kg/s] through an effective area [m^2], straight from a ratio of 0.999 on."""
     near = min(down / up, 1.0)
-    ratio, share = min(near, 0.999), min((1.0 - near) / 0.001, 1.0)
+    ratio = min(near, 0.999)
+    share = min((1.0 - near) / 0.001, 1.0)
     critical = (2.0 / (k + 1.0)) ** (k / (k - 1.0))
     choked = math.sqrt(k / (constant * warmth)) * (2.0 / (k + 1.0)) ** ((k + 1.0) / (2.0 * (k - 1.0)))
     if ratio <= critical:
@@ -99,10 +100,12 @@ def rates(y: Column, angle: float, open_1: bool, open_2: bool, n: "Numbers", gas
     outlet = frost if y[ICE] > 0.0 else max(arriving, frost)
     warmth = between(gas.gas_enthalpies, gas.gas_temperatures, outlet + n.hose_share * (at_hose - outlet))
     product = n.constant * warmth
-    line_1, line_2 = y[LINE_1] * product / n.line_1, y[LINE_2] * product / n.line_2
+    line_1 = y[LINE_1] * product / n.line_1
+    line_2 = y[LINE_2] * product / n.line_2
     volume_1 = n.dead_1 + n.per_angle * (angle - n.lowest)
     volume_2 = n.dead_2 + n.per_angle * (n.highest - angle)
-    inside_1, inside_2 = y[MASS_1] * product / volume_1, y[MASS_2] * product / volume_2
+    inside_1 = y[MASS_1] * product / volume_1
+    inside_2 = y[MASS_2] * product / volume_2
     held = min(n.set_1, bottle - n.margin)
     most = orifice(n.seat, bottle, held, boiling, n.fluid_constant, n.k) * max(0.0, 1.0 - y[ICE] / n.ice_room)
     through = min(max((held - line_1) / n.droop_1, 0.0), most)
@@ -177,13 +180,13 @@ class Numbers(NamedTuple):
 
 def numbers_of(walk: Any) -> Numbers:
     """The numbers of a walk on its bottle."""
-    device, lines, supply = (
-        walk.scenario.device,
-        walk.scenario.supply_lines,
-        walk_of(walk.scenario).bottle,
-    )
-    bottle, actuator = supply.bottle, device.actuator
-    valve, leak = device.valve.orifice, actuator.leak
+    device = walk.scenario.device
+    lines = walk.scenario.supply_lines
+    supply = walk_of(walk.scenario).bottle
+    bottle = supply.bottle
+    actuator = device.actuator
+    valve = device.valve.orifice
+    leak = actuator.leak
     return Numbers(
         device.gas.specific_gas_constant,
         device.gas.heat_capacity_ratio,
@@ -216,18 +219,22 @@ def numbers_of(walk: Any) -> Numbers:
 
 def coil_positions(commands: Floats, wanted: Any, interval: float) -> NDArray[np.bool_]:
     """Whether a coil is open at each sample of the commands: it takes an order 50 ms after its last one or later."""
-    position, taken, found = False, -1.0, np.zeros(commands.size, dtype=np.bool_)
+    position = False
+    taken = -1.0
+    found = np.zeros(commands.size, dtype=np.bool_)
     for sample, command in enumerate(commands):
         time = sample * interval
         if wanted(command) != position and time - taken >= SWITCHING - 1.0e-9:
-            position, taken = not position, time
+            position = not position
+            taken = time
         found[sample] = position
     return found
 
 
 def start_of(walk: Any, n: Numbers, gas: Fluid) -> Column:
     """Everything at the bottle's temperature, lines at their regulators' pressures, chambers vented."""
-    supply, angle = walk_of(walk.scenario).bottle, float(walk.recording["angle"][0])
+    supply = walk_of(walk.scenario).bottle
+    angle = float(walk.recording["angle"][0])
     parts = [supply.temperature, supply.mass, *(supply.temperature,) * 3, 0.0]
     product = n.constant * rates([*parts, *(1.0e-6,) * 4], angle, False, False, n, gas)[1]
     lines = [n.set_1 * n.line_1 / product, n.set_2 * n.line_2 / product]
@@ -239,7 +246,8 @@ def follow(y: Column, angles: Column, open_1: Any, open_2: Any, interval: float,
     """Step from sample to sample: (samples, 12) states, temperature of the gas at the device, regulated mass."""
     parts = round(interval / STEP)
     step = interval / parts
-    first, seen = y[BOTTLE_MASS], []
+    first = y[BOTTLE_MASS]
+    seen = []
     for sample, (a, b) in enumerate(zip(open_1, open_2, strict=True)):
         angle = angles[sample]
         seen.append([*y, rates(y, angle, a, b, n, gas)[1], first - y[BOTTLE_MASS]])
@@ -264,7 +272,8 @@ def moved(y: Column, slope: Column, step: float) -> Column:
 def independent_run(walk: Any, seconds: float) -> Floats:
     """What the equations give for the first seconds of a walk of the solenoid pair: (samples, 12) as ``follow``."""
     n = numbers_of(walk)
-    gas, interval = fluid(n.set_1), float(walk.recording.time[1])
+    gas = fluid(n.set_1)
+    interval = float(walk.recording.time[1])
     commands = walk.recording["command"][: round(seconds / interval) + 1]
     open_1 = coil_positions(commands, lambda command: 0.0 < command < 1.5, interval)
     open_2 = coil_positions(commands, lambda command: command < 0.0, interval)
@@ -274,7 +283,9 @@ def independent_run(walk: Any, seconds: float) -> Floats:
 
 def differences(walk: Any, seen: Floats) -> dict[str, float]:
     """Largest differences over time: temperatures [K], gas [g] and pressures [Pa] in lines and chambers (RMS too)."""
-    recording, samples, n = walk.recording, seen.shape[0], numbers_of(walk)
+    recording = walk.recording
+    samples = seen.shape[0]
+    n = numbers_of(walk)
     product = n.constant * seen[:, 10]
     angle = recording["angle"][:samples]
     mine = {

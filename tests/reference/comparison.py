@@ -77,7 +77,8 @@ def differences(scenario: Scenario, answer: Answer, other: Any, keep: Any) -> tu
     if not keep.any():
         return 0.0, 0.0
     angle = np.abs(other[0] - answer.angle)[keep].max() / (actuator.angle_max - actuator.angle_min)
-    gap_1, gap_2 = np.abs(other[1] - answer.pressure_1), np.abs(other[2] - answer.pressure_2)
+    gap_1 = np.abs(other[1] - answer.pressure_1)
+    gap_2 = np.abs(other[2] - answer.pressure_2)
     pressure = np.maximum(gap_1, gap_2)[keep].max() / pressure_range(scenario, answer)
     return float(angle) / LARGEST_ANGLE, float(pressure) / LARGEST_PRESSURE
 

@@ -142,7 +142,8 @@ def leg(chance: Chance, speed: float = 0.0, torque: float = 0.0, stops: float = 
         "frequency": f"{logarithmic(chance, 0.5, 4.0)} Hz",
         "phase": f"{chance.random()}",
     }
-    start, push = free(chance, speed, 0.0, stops), chance.uniform(-torque, torque)
+    start = free(chance, speed, 0.0, stops)
+    push = chance.uniform(-torque, torque)
     return {
         "kind": "leg",
         "angle": start["angle"],
@@ -353,7 +354,8 @@ def mixed(chance: Chance) -> Document:
     law = law if law["kind"] == "constant" else sampled(chance, law)
     motion: Document = free(chance, chance.choice([0.0, 300.0]), chance.choice([0.0, 30.0]))
     if chance.random() < 0.3:
-        level, low = f"{chance.uniform(40.0, 110.0)} deg", f"{chance.uniform(40.0, 110.0)} deg"
+        level = f"{chance.uniform(40.0, 110.0)} deg"
+        low = f"{chance.uniform(40.0, 110.0)} deg"
         path = {"kind": "ramp_hold", "start_level": low, "level": level, "ramp_start": "0.05 s", "ramp_time": "0.1 s"}
         motion = chance.choice([{"kind": "locked", "angle": level}, {"kind": "prescribed", "profile": path}])
     elif chance.random() < 0.3:

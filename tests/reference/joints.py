@@ -52,7 +52,8 @@ class CylinderJoint:
     def _length(self, angle: float) -> tuple[float, float]:
         lever, base = self.sides
         # The rod end over a joint at the origin, with the base along the first axis.
-        x, y = lever * math.cos(angle + self.offset), lever * math.sin(angle + self.offset)
+        x = lever * math.cos(angle + self.offset)
+        y = lever * math.sin(angle + self.offset)
         length = math.hypot(x - base, y)
         # The rod end moves across the lever; only its part along the cylinder makes that longer.
         return length, (-y * (x - base) + x * y) / length
@@ -82,7 +83,8 @@ class BladderJoint:
         with file.open(encoding="utf-8") as lines:
             rows = list(csv.reader(line for line in lines if not line.startswith("#")))
         measured = np.array([[float(cell) for cell in row] for row in rows[1:]])
-        angles, gauges = np.unique(measured[:, 0]), np.unique(measured[:, 1])
+        angles = np.unique(measured[:, 0])
+        gauges = np.unique(measured[:, 1])
         self.room = scenario.device.supply.atmospheric_pressure
         self.pressures = self.room + 1.0e3 * gauges
         self.curves: list[CubicSpline | None] = [None, None]
@@ -95,7 +97,8 @@ class BladderJoint:
             )
             self.curves[which] = CubicSpline(np.radians(angles), 1.0e-6 * volumes)
         self.dead = actuator.dead_volume_1, actuator.dead_volume_2
-        self.stiffness, self.rest = actuator.passive_stiffness, actuator.rest_angle
+        self.stiffness = actuator.passive_stiffness
+        self.rest = actuator.rest_angle
 
     def _levels(self, which: int, angle: float, derivative: int = 0) -> Any:
         curve = self.curves[which]
@@ -103,7 +106,8 @@ class BladderJoint:
 
     def chamber(self, which: int, angle: float, pressure: float) -> Chamber:
         """Straight lines between measured pressures, constant beyond them."""
-        levels, slopes = self._levels(which, angle), self._levels(which, angle, 1)
+        levels = self._levels(which, angle)
+        slopes = self._levels(which, angle, 1)
         place = int(np.searchsorted(self.pressures, pressure, side="right"))
         inside = 0 < place < self.pressures.size
         grows = (levels[place] - levels[place - 1]) / (self.pressures[place] - self.pressures[place - 1])
@@ -116,7 +120,8 @@ class BladderJoint:
     def pressure(self, which: int, angle: float, content: float) -> float:
         """Bisection over the pressure: pressure times volume only grows with it."""
         levels = self._levels(which, angle)
-        low, high = 0.0, content / self.dead[which]
+        low = 0.0
+        high = content / self.dead[which]
         while high - low > 1.0e-13 * high:
             middle = 0.5 * (low + high)
             if middle * (self.dead[which] + float(np.interp(middle, self.pressures, levels))) > content:

@@ -31,8 +31,9 @@ def unknowns_before_valve(program: Program) -> int:
     return gas_unknowns(program) + sum(len(leaf_paths(row, name)) for name, row in program.effect_states.items())
 
 
-ARRAYS, NUMBERS = ("y", "slopes", "parameters"), ("t", "command", "way")
-"""Parameters of the right-hand side."""
+# Parameters of the right-hand side.
+ARRAYS = ("y", "slopes", "parameters")
+NUMBERS = ("t", "command", "way")
 
 
 def parameter_groups(program: Program) -> dict[str, type]:

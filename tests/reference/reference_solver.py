@@ -72,7 +72,8 @@ class SampledControl:
         if run.program.controller is None:
             raise SimulationError("the reference solver runs controllers of the catalogue only")
         self._run = run
-        self._controller, self._inverts = run.program.controller, run.program.inverts_valve
+        self._controller = run.program.controller
+        self._inverts = run.program.inverts_valve
         self._state = run.program.controller.initial
         self._first_signals = first_signals
         self._seen: dict[int, Signals] = {}
@@ -220,7 +221,8 @@ class _Solution:
         self.settle = in_program(run.program.valve.settle, run.program, run.effects)
         self.driven = torque_at_rest(run)
         self.arrived = 0.0
-        self.command, self.time = 0.0, 0.0
+        self.command = 0.0
+        self.time = 0.0
         self.way = self.rest_mode() if run.program.angle is None else 0.0
         if self.y[1] != 0.0 and run.program.angle is None:
             self.way = float(np.sign(self.y[1]))
@@ -312,7 +314,8 @@ class _Solution:
 
     def states_in(self, y: Any) -> dict[str, Any]:
         """States of effects among unknowns, by name."""
-        states, first = {}, gas_unknowns(self.run.program)
+        states = {}
+        first = gas_unknowns(self.run.program)
         for name, row in self.run.program.effect_states.items():
             count = len(leaf_paths(row, name))
             states[name] = rebuilt(row, map(float, y[first : first + count]))
@@ -342,7 +345,8 @@ class _Solution:
         self.arrived = self.controller.arriving(self.time, self.arrived)
         self.command = self.arrived
         self.command = self.follows(self.states_in(self.y), self.arrived)
-        first, states = gas_unknowns(self.run.program), self.states_in(self.y)
+        first = gas_unknowns(self.run.program)
+        states = self.states_in(self.y)
         for effect, row in zip(self.run.program.effects, self.run.effects, strict=True):
             if effect.state is None:
                 continue
@@ -464,7 +468,8 @@ def measure_agreement(run: Run, outcome: BatchResult, reference: ReferenceResult
         away &= np.abs(reference.times - impact) > IMPACT_WINDOW
     gauge = max(plant.supply_pressure, plant.dorsiflexion_pressure) - plant.atmospheric_pressure
     pressure_range = gauge if gauge > 0.0 else plant.atmospheric_pressure
-    ours, theirs = chamber_pressures_of(run, states), chamber_pressures_of(run, reference.states)
+    ours = chamber_pressures_of(run, states)
+    theirs = chamber_pressures_of(run, reference.states)
     differences = [
         (states[:, 0] - reference.states[:, 0]) / (plant.angle_max - plant.angle_min),
         (ours[0] - theirs[0]) / pressure_range,

@@ -22,8 +22,9 @@ STANDARD_GRAVITY = 9.80665
 
 MEASURED, DECIDED, ARRIVED = range(3)
 ANGLE, VELOCITY, MASS_1, MASS_2, ENERGY_1, ENERGY_2, SPOOL, SPOOL_RATE, ASKED, TAKEN = range(10)
-REST, LED = 0.0, 9.0
-"""Ways of the vane, beside 1 and -1 for a vane that moves."""
+# Ways of the vane, beside 1 and -1 for a vane that moves.
+REST = 0.0
+LED = 9.0
 NEVER = 1.0e300
 SAME_INSTANT = 1.0e-12
 LONGEST_STEP = 2.0e-4
@@ -43,7 +44,9 @@ WEIGHTS = np.array(
 )
 ERRORS = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
 """Dormand and Prince 1980: times and weights of the stages, the last of which is the result, and of the error."""
-CONSTANT, RAMP_HOLD, SINE = 0.0, 1.0, 2.0
+CONSTANT = 0.0
+RAMP_HOLD = 1.0
+SINE = 2.0
 CONTROLLERS = {"constant": 0.0, "on_off": 1.0, "pid": 2.0}
 PROFILES = {"constant": CONSTANT, "ramp_hold": RAMP_HOLD, "sine": SINE}
 
@@ -283,7 +286,8 @@ def shares_of(rig: Rig, y: Any, coils: Any) -> tuple[float, float, float, float]
     if rig.valve.solenoid > 0.0:
         return coils[0, 0], 1.0 - coils[0, 0], coils[1, 0], 1.0 - coils[1, 0]
     opening = y[SPOOL] if rig.valve.frequency > 0.0 else y[ASKED]
-    towards_1, towards_2 = min(max(opening, 0.0), 1.0), min(max(-opening, 0.0), 1.0)
+    towards_1 = min(max(opening, 0.0), 1.0)
+    towards_2 = min(max(-opening, 0.0), 1.0)
     return towards_1, towards_2, towards_2, towards_1
 
 
@@ -294,13 +298,17 @@ def turning_inertia(rig: Rig) -> float:
 
 def stride(leg: Leg, curve: int, time: float) -> tuple[float, float, float]:
     """Value, rate and second derivative of a curve of the gait."""
-    turn, terms = 2.0 * math.pi, leg.curves.shape[1] // 2
+    turn = 2.0 * math.pi
+    terms = leg.curves.shape[1] // 2
     terms_of = leg.curves[curve].tolist()
-    value, rate, second = terms_of[0], 0.0, 0.0
+    value = terms_of[0]
+    rate = 0.0
+    second = 0.0
     for number in range(1, terms + 1):
         pace = turn * number * leg.frequency
         place = turn * number * (leg.start + leg.frequency * time)
-        along, across = terms_of[number], terms_of[terms + number]
+        along = terms_of[number]
+        across = terms_of[terms + number]
         value += along * math.cos(place) + across * math.sin(place)
         rate += pace * (across * math.cos(place) - along * math.sin(place))
         second -= pace * pace * (along * math.cos(place) + across * math.sin(place))
@@ -313,10 +321,12 @@ def torque_on_foot(rig: Rig, time: float, angle: float) -> float:
     Newton's law of that body in the frame of the room: its angle over the horizontal is alpha, its weight acts at S
     over the mass, and the ankle carries it along a circle about the knee, which has accelerations of its own.
     """
-    knee_forward, knee_up = 0.0, 0.0
+    knee_forward = 0.0
+    knee_up = 0.0
     if rig.leg.frequency > 0.0:
         shank, shank_rate, shank_bend = stride(rig.leg, 0, time)
-        knee_forward, knee_up = stride(rig.leg, 1, time)[0], stride(rig.leg, 2, time)[0]
+        knee_forward = stride(rig.leg, 1, time)[0]
+        knee_up = stride(rig.leg, 2, time)[0]
     else:
         shank, shank_rate = follow(rig.leg.shank, time)
         shank_bend = bend(rig.leg.shank, time)
@@ -344,7 +354,8 @@ def net_torque(rig: Rig, time: float, angle: float, pressure_1: float, pressure_
 def rates(rig: Rig, time: float, state: Any, way: float, coils: Any, target: float, slopes: Any) -> None:
     """Time derivatives of all unknowns, equations (1) to (10)."""
     # Python's own numbers are quicker than an array's elements.
-    y, slope = state.tolist(), [0.0] * state.size
+    y = state.tolist()
+    slope = [0.0] * state.size
     angle, velocity = place_of(rig, time, y)
     pressure_1, pressure_2, warmth_1, warmth_2 = gas_of(rig, angle, y)
     if abs(way) == 1.0:
@@ -462,7 +473,8 @@ def decide(rig: Rig, time: float, seen: Any, memory: Any) -> float:
     memory[0] += law.i * error * law.period
     slope = (error - memory[1]) / law.period if memory[3] > 0.0 else 0.0
     memory[2] += (slope - memory[2]) * law.period / (law.filter + law.period)
-    memory[1], memory[3] = error, 1.0
+    memory[1] = error
+    memory[3] = 1.0
     wanted = law.p * error + memory[0] + law.d * memory[2]
     command = min(max(wanted, -1.0), 1.0)
     memory[0] += law.anti_windup * (command - wanted) * law.period
@@ -486,7 +498,8 @@ def settle_coils(valve: Valve, coils: Any, command: float, time: float) -> float
             coil[0] = coil[1]
         if wanted != coil[1]:
             if time >= coil[2] + valve.interval - SAME_INSTANT:
-                coil[1], coil[2] = wanted, time
+                coil[1] = wanted
+                coil[2] = time
                 coil[3] = time + (valve.opening_delay if wanted > 0.0 else valve.closing_delay)
                 if coil[3] <= time + SAME_INSTANT:
                     coil[0] = wanted
@@ -543,7 +556,8 @@ def advance(
             if not last or step > 0.5 * h:
                 h = min(step * (min(0.9 * error**-0.2, 4.0) if error > 0.0 else 4.0), LONGEST_STEP)
             continue
-        before, after = 0.0, step
+        before = 0.0
+        after = step
         while after - before > 1.0e-13:
             middle = 0.5 * (before + after)
             if middle <= before or middle >= after:
@@ -570,7 +584,8 @@ def settle_loop(rig: Rig, time: float, y: Any, due: Any, seen: Any, commands: An
     while due[MEASURED] < commands.size and due[MEASURED] * law.period - law.delay <= time + SAME_INSTANT:
         angle, _ = place_of(rig, time, y)
         pressure_1, pressure_2, _, _ = gas_of(rig, angle, y)
-        seen[due[MEASURED], 0], seen[due[MEASURED], 1] = pressure_1, pressure_2
+        seen[due[MEASURED], 0] = pressure_1
+        seen[due[MEASURED], 1] = pressure_2
         due[MEASURED] += 1
     while due[DECIDED] < commands.size and due[DECIDED] * law.period <= time + SAME_INSTANT:
         commands[due[DECIDED]] = decide(rig, time, seen[due[DECIDED]], memory)
@@ -617,21 +632,31 @@ def first_way(rig: Rig, y: Any) -> float:
 
 def solve(rig: Rig, y: Any, interval: float, records: Any, impacts: Any, tolerance: float) -> Any:
     """Fill the records, a row every ``interval`` [s]; steps, impacts and events counted."""
-    counts, due = np.zeros(3, np.int64), np.zeros(3, np.int64)
-    work, coils, memory = np.zeros((8, y.size)), np.zeros((2, 4)), np.zeros(4)
+    counts = np.zeros(3, np.int64)
+    due = np.zeros(3, np.int64)
+    work = np.zeros((8, y.size))
+    coils = np.zeros((2, 4))
+    memory = np.zeros(4)
     coils[:, 2] = -1.0e9
     samples = int(interval * (records.shape[0] - 1) / rig.law.period + 1.0e-9) + 1
-    seen, commands = np.zeros((samples, 2)), np.zeros(samples)
+    seen = np.zeros((samples, 2))
+    commands = np.zeros(samples)
     way = first_way(rig, y)
-    time, recorded, h = 0.0, 0, 1.0e-6
+    time = 0.0
+    recorded = 0
+    h = 1.0e-6
     while True:
         command = settle_loop(rig, time, y, due, seen, commands, memory)
         target, change = settle_valve(rig.valve, y, coils, command, time)
         if interval * recorded <= time + SAME_INSTANT:
             angle, velocity = place_of(rig, time, y)
             pressure_1, pressure_2, _, _ = gas_of(rig, angle, y)
-            records[recorded, 0], records[recorded, 1], records[recorded, 2] = time, angle, velocity
-            records[recorded, 3], records[recorded, 4], records[recorded, 5] = pressure_1, pressure_2, y[TAKEN]
+            records[recorded, 0] = time
+            records[recorded, 1] = angle
+            records[recorded, 2] = velocity
+            records[recorded, 3] = pressure_1
+            records[recorded, 4] = pressure_2
+            records[recorded, 5] = y[TAKEN]
             recorded += 1
         if recorded >= records.shape[0] or counts[0] > MOST_STEPS:
             return counts
@@ -643,7 +668,8 @@ def solve(rig: Rig, y: Any, interval: float, records: Any, impacts: Any, toleran
 def restriction(orifice: Any, scenario: Scenario) -> Restriction:
     """An orifice in either form, equation (6) or ISO 6358 for another gas than air."""
     gas = scenario.device.gas
-    k, constant = gas.heat_capacity_ratio, UNIVERSAL_GAS_CONSTANT / gas.molar_mass
+    k = gas.heat_capacity_ratio
+    constant = UNIVERSAL_GAS_CONSTANT / gas.molar_mass
     if hasattr(orifice, "area"):
         choked = math.sqrt(k / (constant * gas.temperature) * (2.0 / (k + 1.0)) ** ((k + 1.0) / (k - 1.0)))
         conductance = orifice.discharge_coefficient * orifice.area * choked
@@ -655,7 +681,8 @@ def restriction(orifice: Any, scenario: Scenario) -> Restriction:
 
 def path_of(choice: Any) -> Path:
     """A profile as numbers."""
-    s, kind = choice.settings, PROFILES[choice.kind]
+    s = choice.settings
+    kind = PROFILES[choice.kind]
     if kind == SINE:
         return Path(kind, s["level"], s["amplitude"], s["frequency"], s["phase"])
     if kind == RAMP_HOLD:
@@ -691,7 +718,8 @@ def valve_of(scenario: Scenario) -> Valve:
 
 def law_of(scenario: Scenario, bias: float) -> Law:
     """Controller and sensors as numbers; their noise must be off."""
-    s, sensors = scenario.controller.settings, scenario.sensors
+    s = scenario.controller.settings
+    sensors = scenario.sensors
     if sensors.angle_noise or sensors.pressure_noise:
         raise ValueError("the reference knows no noise")
     names = ("proportional_gain", "integral_gain", "derivative_gain", "derivative_filter", "anti_windup", "dead_band")
@@ -702,8 +730,13 @@ def law_of(scenario: Scenario, bias: float) -> Law:
 
 def rig_of(scenario: Scenario, bias: float = 0.0, relieving: bool | None = None, joint: Joint | None = None) -> Rig:
     """The numbers of a scenario; of an actuator that is no vane, the ``joint``."""
-    device, motion, warm = scenario.device, scenario.motion, scenario.gas_model
-    actuator, friction, supply, gas = device.actuator, device.friction, device.supply, device.gas
+    device = scenario.device
+    motion = scenario.motion
+    warm = scenario.gas_model
+    actuator = device.actuator
+    friction = device.friction
+    supply = device.supply
+    gas = device.gas
     free = isinstance(motion, FreeMotion)
     leg = motion.leg if free else None
     return Rig(
@@ -760,8 +793,10 @@ def start_of(scenario: Scenario, rig: Rig, moved: float) -> Any:
     else:
         content_1 *= rig.joint.chamber(0, y[ANGLE], content_1).volume
         content_2 *= rig.joint.chamber(1, y[ANGLE], content_2).volume
-    y[MASS_1], y[MASS_2] = content_1 / product, content_2 / product
-    y[ENERGY_1], y[ENERGY_2] = content_1 / (rig.k - 1.0), content_2 / (rig.k - 1.0)
+    y[MASS_1] = content_1 / product
+    y[MASS_2] = content_2 / product
+    y[ENERGY_1] = content_1 / (rig.k - 1.0)
+    y[ENERGY_2] = content_2 / (rig.k - 1.0)
     return y
 
 

@@ -36,13 +36,15 @@ SENSITIVE: dict[str, tuple[str, ...]] = {
         "run.duration=0.3 s",
     ),
 }
-FEWEST, MOST = 1.0, 3.0
-"""Estimate over true error; those of 1,000 draws have 1.1 to 1.7 in nine of ten."""
+# Estimate over true error; those of 1,000 draws have 1.1 to 1.7 in nine of ten.
+FEWEST = 1.0
+MOST = 3.0
 
 
 def true_error(scenario: Scenario) -> float:
     """Largest error of a pressure [Pa] at any sample."""
-    answer, recording = independent_run(scenario), simulate(scenario).recording
+    answer = independent_run(scenario)
+    recording = simulate(scenario).recording
     return max(
         float(np.abs(recording[name] - values).max())
         for name, values in (("pressure_1", answer.pressure_1), ("pressure_2", answer.pressure_2))
@@ -52,7 +54,8 @@ def true_error(scenario: Scenario) -> float:
 @pytest.mark.parametrize("case", SENSITIVE)
 def test_an_error_above_the_promised_one_is_estimated_and_makes_the_run_sensitive(case: str) -> None:
     scenario = load_scenario("step-response", SENSITIVE[case])
-    wrong, allowed = true_error(scenario), LARGEST_OF_PRESSURE * pressure_range(scenario, independent_run(scenario))
+    wrong = true_error(scenario)
+    allowed = LARGEST_OF_PRESSURE * pressure_range(scenario, independent_run(scenario))
     result = simulate(scenario)
     check = result.check()
     row = next(row for row in check.courses if row.name == "pressures over time")
@@ -76,7 +79,8 @@ def test_a_hundredth_of_the_tolerance_makes_less_than_a_tenth_of_the_error_and_t
     case = SENSITIVE["small chamber at a stop that throws the vane back"]
     usual, fine = (load_scenario("step-response", [*case, f"run.tolerance={value}"]) for value in (1e-3, 1e-5))
     assert true_error(fine) < 0.1 * true_error(usual)
-    told, untold = simulate(usual).recording, simulate(load_scenario("step-response", case)).recording
+    told = simulate(usual).recording
+    untold = simulate(load_scenario("step-response", case)).recording
     assert np.array_equal(told["pressure_1"], untold["pressure_1"])
 
 

@@ -37,7 +37,8 @@ def test_settings_of_a_library_are_single_runs_with_the_same_words_or_refused_by
 @pytest.mark.parametrize("name", [*list_scenarios(), *list_walks()])
 def test_a_slider_of_a_page_moves_over_values_that_its_program_runs(name: str, tmp_path: Path) -> None:
     scenario = load_scenario(name)
-    built, room = BuiltLibrary(scenario, tmp_path), scenario.device.supply.atmospheric_pressure
+    built = BuiltLibrary(scenario, tmp_path)
+    room = scenario.device.supply.atmospheric_pressure
     dead = {}
     for one in page_settings(scenario, built.library, ()):
         # What a browser lets a slider have is a whole number of steps above its lower end.
@@ -72,7 +73,8 @@ def test_a_slider_of_a_page_moves_over_values_that_its_program_runs(name: str, t
 def test_a_rule_on_profiles_gait_and_actuator_holds_in_a_library_as_in_a_file(
     tmp_path: Path, name: str, number: tuple[str, float], text: str, named: str
 ) -> None:
-    built, (path, value) = BuiltLibrary(load_scenario(name), tmp_path), number
+    built = BuiltLibrary(load_scenario(name), tmp_path)
+    path, value = number
     (unit,) = (setting.quantity.unit for setting in built.library.settings if setting.path == path)
     refusal = single(name, {path: f"{value!r} {unit}"})
     assert isinstance(refusal, str)

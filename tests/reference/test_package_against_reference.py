@@ -39,7 +39,8 @@ def test_determined_draws_are_within_the_limits(family: str) -> None:
 def test_the_reference_would_see_a_device_that_is_wrong_by_two_in_a_thousand(
     flaw: str, step_response: Scenario
 ) -> None:
-    answer, other = independent_run(step_response), independent_run(load_scenario("step-response", (flaw,)))
+    answer = independent_run(step_response)
+    other = independent_run(load_scenario("step-response", (flaw,)))
     keep = away_from_impacts(answer.time, answer.impacts, other.impacts)
     assert max(differences(step_response, answer, columns(other), keep)) > 1.0
     assert max(differences(step_response, answer, columns(independent_run(step_response, 1e-11)), keep)) < 1e-3
@@ -48,7 +49,8 @@ def test_the_reference_would_see_a_device_that_is_wrong_by_two_in_a_thousand(
 def reference_gap(scenario: Scenario) -> float:
     """Largest difference between reference solver and independent run away from impacts, over the limits."""
     run = plan_run(scenario)
-    answer, reference = independent_run(scenario), solve_reference(run)
+    answer = independent_run(scenario)
+    reference = solve_reference(run)
     keep = away_from_impacts(answer.time, answer.impacts, reference.impacts)
     seen = (reference.states[:, 0], *chamber_pressures_of(run, reference.states))
     return max(differences(scenario, answer, seen, keep))

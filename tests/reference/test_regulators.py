@@ -52,7 +52,8 @@ def regulated(
 
 def flow(upstream: float, downstream: float, conductance: float, ratio: float) -> float:
     """Mass flow [kg/s] of ISO 6358, linear from a ratio of 0.999 on."""
-    high, low = max(upstream, downstream), min(upstream, downstream)
+    high = max(upstream, downstream)
+    low = min(upstream, downstream)
     share = 1.0 if low / high <= ratio else math.sqrt(1.0 - ((min(low / high, 0.999) - ratio) / (1.0 - ratio)) ** 2)
     share *= min(1.0, (1.0 - low / high) / 0.001)
     return math.copysign(conductance * high * share, upstream - downstream)
@@ -60,8 +61,10 @@ def flow(upstream: float, downstream: float, conductance: float, ratio: float) -
 
 def solved(scenario: Scenario, command: float, times: np.ndarray) -> np.ndarray:
     """Pressures [Pa] over time of both chambers, by an equation of this test: set pressure, opening, flow, gas law."""
-    device, plant = scenario.device, plant_parameters(scenario.device)
-    valve, chambers = device.valve, ACTUATORS[device.actuator.kind].model.chambers
+    device = scenario.device
+    plant = plant_parameters(scenario.device)
+    valve = device.valve
+    chambers = ACTUATORS[device.actuator.kind].model.chambers
     span = valve.highest_pressure - valve.lowest_pressure
     constant = valve.response_time / math.log(9.0)
     moves = "amplitude" in getattr(scenario.motion.profile, "settings", {})
@@ -71,19 +74,23 @@ def solved(scenario: Scenario, command: float, times: np.ndarray) -> np.ndarray:
         return chambers(plant, angle, 1e5, 1e5)[:2]
 
     def rates(time: float, pressures: np.ndarray) -> list[float]:
-        found, late = [], max(time - valve.delay, 0.0)
+        found = []
+        late = max(time - valve.delay, 0.0)
         begun = 1.0 - math.exp(-late / constant) if constant > 0.0 else 1.0
-        now, soon = volumes(time), volumes(time + 1e-6)
+        now = volumes(time)
+        soon = volumes(time + 1e-6)
         for place, (share, supply) in enumerate(((max(command, 0.0), 5e5), (max(-command, 0.0), 5e5))):
             off = (valve.lowest_pressure + span * share * begun - pressures[place]) / (valve.band * span)
-            source, room = (supply + 101325.0, 101325.0)
+            source = supply + 101325.0
+            room = 101325.0
             gained = min(max(off, 0.0), 1.0) * max(flow(source, pressures[place], plant.valve_conductance, 0.3), 0.0)
             gained += min(max(-off, 0.0), 1.0) * flow(room, pressures[place], plant.valve_conductance, 0.3)
             growth = (soon[place] - now[place]) / 1e-6
             found.append((plant.gas_product * gained - pressures[place] * growth) / now[place])
         return found
 
-    pressures, parts = np.full((2, 1), 101325.0), []
+    pressures = np.full((2, 1), 101325.0)
+    parts = []
     # The command arrives between two parts.
     for begin, end in pairwise(dict.fromkeys((0.0, valve.delay, times[-1]))):
         here = np.append(times[(times >= begin) & (times < end)], end)
@@ -126,13 +133,15 @@ def test_hysteresis_and_resolution_are_those_of_the_settings_and_a_vent_sets_the
     valve = MODEL.prepare(RegulatorSettings(1.0e5, 6.0e5, 0.0, 0.0, 0.01, 0.02, 0.01))
 
     def course(commands: list[float]) -> list[float]:
-        state, found = MODEL.state(), []
+        state = MODEL.state()
+        found = []
         for command in commands:
             shown, state = MODEL.advance(valve, state, command, 0.0, 1e-3)
             found.append(shown.second_1)
         return found
 
-    rising, falling = np.linspace(0.0, 1.0, 501).tolist(), np.linspace(1.0, 0.0, 501).tolist()
+    rising = np.linspace(0.0, 1.0, 501).tolist()
+    falling = np.linspace(1.0, 0.0, 501).tolist()
     pressures = course([*rising, *falling])
     widths = np.array(pressures[1001:501:-1]) - np.array(pressures[:500])
     assert np.max(widths) == pytest.approx(0.02 * 5e5, abs=0.01 * 5e5)
@@ -249,7 +258,9 @@ def test_the_response_time_is_fitted_to_a_step(tmp_path: Path) -> None:
 def test_the_torque_reaches_as_far_as_the_set_pressures() -> None:
     changes = ("supply.pressure=9 bar_g", "supply.dorsiflexion_pressure=9 bar_g", "valve.lowest_pressure=3 bar_g")
     scenario = regulated(LOCKED, CONSTANT, {"kind": "constant", "level": "1 N m"}, *changes)
-    angle, vented, valve = math.radians(75.0), 1.01325e5, scenario.device.valve
+    angle = math.radians(75.0)
+    vented = 1.01325e5
+    valve = scenario.device.valve
     torque = static_torque(scenario.device)
     highest = torque(angle, valve.highest_pressure, vented + 3.0e5)
     assert torque_reach(scenario.device, angle)[1] == pytest.approx(highest)
