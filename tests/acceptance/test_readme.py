@@ -142,8 +142,13 @@ def test_the_answers_of_the_five_minutes_are_those_of_runs() -> None:
             ("torque-task-solenoid", ()),
         )
     )
-    error = lambda metrics: f"{metrics['rms_error'].value:.3g}"
-    gas = lambda m: f"{1e3 * m['gas_supplied'].value:.3g}"
+
+    def error(metrics):
+        return f"{metrics['rms_error'].value:.3g}"
+
+    def gas(m):
+        return f"{1e3 * m['gas_supplied'].value:.3g}"
+
     assert f"{error(first)} N m, {gas(first)} g" in lines["1"]
     assert f"{error(more)} N m, {gas(more)} g" in lines["2"]
     assert f"{error(pair)} and {error(first)} N m, {gas(pair)} and {gas(first)} g" in lines["3"]

@@ -250,7 +250,7 @@ def summarise(study: Study, results: StudyResults) -> StudyResults:
             for each in study.configurations
             if each.scenario.follows_reference or tracking[each.name].without_verdict < completed[each.name]
         },
-        "remarks": ask.left_out(study),
+        "remarks": [*ask.left_out(study)],
         "failures": failures,
         "configurations": {
             name: {
@@ -354,11 +354,10 @@ def finding_of(results: StudyResults) -> ask.Finding[StudyResults]:
         share = 100.0 * count / max(completed[name], 1)
         oscillating = f"{name}: in {count:,} of {completed[name]:,} runs ({share:.3g} %) the loop oscillates"
         said += [oscillating] if count else []
-    said += _tracking_texts(results)
+    said += [*_tracking_texts(results), *summary.get("remarks", ())]
     # With fewer than half of the runs, the median would be that of the failed ones.
     useless = [name for name, count in completed.items() if 2 * count < runs]
     said += [f"{name}: most runs failed: the statistics of the others do not describe the study" for name in useless]
-    said += summary.get("remarks", ())
     rows = []
     for number in study.get("vary", ()):
         keys = (f"{key.replace('_', ' ')} {value}" for key, value in number.items() if key not in ("path", "kind"))

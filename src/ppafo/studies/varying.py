@@ -1,7 +1,7 @@
 """Varied values of a study: paths with units and limits; conversion of ``[[vary]]`` tables to SI."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -115,24 +115,20 @@ def varied_path(
     return VariedPath(path, quantity, atmosphere, is_gauge, given if is_plain and fits(given, quantity.unit) else "")
 
 
-def left_out(study: Study) -> list[str]:
-    """Remarks on drawn paths whose values all lie on one side of the value that a scenario of the study has."""
-    remarks = []
+def left_out(study: Study) -> Iterator[str]:
+    """Yield a remark on each drawn path whose values are all on one side of the value in a scenario of the study."""
     for drawn in study.drawn:
         low, high = drawn.distribution.values(np.array([_TAIL, 1.0 - _TAIL])).tolist()
-        unit = study.units[drawn.path]
-        shown = partial(shown_text, si_unit=unit, unit=study.given.get(drawn.path, ""))
+        shown = partial(shown_text, si_unit=study.units[drawn.path], unit=study.given.get(drawn.path, ""))
         for configuration in study.configurations:
-            supply = configuration.scenario.device.supply
-            zero = supply.atmospheric_pressure if drawn.path in study.gauge else 0.0
+            zero = configuration.scenario.device.supply.atmospheric_pressure if drawn.path in study.gauge else 0.0
             nominal = value_at(drawn.path, configuration.scenario)
             varies = configuration.name in study.only.get(drawn.path, (configuration.name,))
             if varies and nominal is not None and not low <= nominal - zero <= high:
-                remarks.append(
+                yield (
                     f"{configuration.name}: {drawn.path} is drawn from {shown(low + zero)} to {shown(high + zero)}, "
                     f"which leaves out its value, {shown(nominal)}"
                 )
-    return remarks
 
 
 def value_at(path: str, scenario: Scenario) -> float | None:

@@ -6,7 +6,7 @@ item determines its width. Values beyond 32 bits are refused, so that the remain
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from ppafo.errors import ProgramError
 from ppafo.translation import typed
@@ -15,9 +15,9 @@ from ppafo.translation.value_types import INT, INT16, INT32, Items, Row, Scalar,
 
 # Loops are gone through turn by turn: more would take long, and no fixed-point law has them.
 MOST_TURNS = 64
-Range: TypeAlias = "IntegerRange | tuple[Range, ...]"
-"""Range of a number, or ranges of row fields or tuple items."""
-Names: TypeAlias = "dict[str, Range]"
+Range: TypeAlias = Any
+"""``IntegerRange`` of a number, or a tuple of the ranges of row fields or tuple items, as its type in the term says."""
+Names: TypeAlias = dict[str, Range]
 
 
 class IntegerRange(NamedTuple):
@@ -55,8 +55,6 @@ def hull(first: Range, other: Range) -> Range:
     """Return the smallest range that contains two ranges."""
     if isinstance(first, IntegerRange) and isinstance(other, IntegerRange):
         return IntegerRange(min(first.low, other.low), max(first.high, other.high))
-    assert not isinstance(first, IntegerRange)
-    assert not isinstance(other, IntegerRange)
     return tuple(hull(*pair) for pair in zip(first, other, strict=True))
 
 
@@ -103,7 +101,6 @@ class _Ranges:
     def note(self, kind: Type, value: Range) -> None:
         """Extend the ranges of a row or tuple type, since all values of a type share widths."""
         if isinstance(kind, Row | Items):
-            assert not isinstance(value, IntegerRange)
             self.parts[kind] = hull(self.parts.get(kind, value), value)
             for part, own in zip(types_in(kind), value, strict=True):
                 self.note(part, own)
@@ -122,8 +119,6 @@ class _Ranges:
     def count(self, function: Function, loop: typed.CountedLoop, names: Names) -> None:
         """Evaluate a loop by iterations; names then have their ranges over all possible counts."""
         start, stop = (self.value(function, part, names) for part in (loop.start, loop.stop))
-        assert isinstance(start, IntegerRange)
-        assert isinstance(stop, IntegerRange)
         if start.low != start.high or stop.high - start.low > MOST_TURNS:
             raise _refused(function, f"a loop must have a literal start and at most {MOST_TURNS} iterations")
         # A loop without a turn leaves the counter as it was; it has a width all the same.
@@ -146,7 +141,6 @@ class _Ranges:
             value = names[term.detail]
         elif term.kind in ("field", "item") and len(parts) == 1:
             whole = parts[0]
-            assert not isinstance(whole, IntegerRange)
             kind = term.parts[0].type
             index = [name for name, _ in kind.fields].index(term.detail) if isinstance(kind, Row) else int(term.detail)
             value = whole[index]
@@ -224,12 +218,10 @@ class _Narrowing:
         """Return a type with the widths required by a range of values."""
         if isinstance(kind, Row | Items):
             every = self.ranges.parts[kind]
-            assert not isinstance(every, IntegerRange)
             if isinstance(kind, Row):
                 pairs = zip(kind.fields, every, strict=True)
                 return Row(kind.name, tuple((name, self.type_of(inner, own)) for (name, inner), own in pairs))
             return Items(tuple(self.type_of(*pair) for pair in zip(kind.types, every, strict=True)))
-        assert isinstance(value, IntegerRange)
         # A value beyond 32 bits was refused with its range.
         return _width(value) or kind if kind == INT else kind
 

@@ -12,7 +12,6 @@ from ppafo.engine.in_python import in_program
 from ppafo.engine.rows import of_each
 from ppafo.engine.run import Run, Walk, states_at_start
 from ppafo.engine.scheme.actuators import filled_chambers, filled_state
-from ppafo.model.actuators.kind import Chambers
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.columns import Problem, at, larger, over_runs, smaller
 from ppafo.model.elementary import QUARTER_TURN
@@ -75,9 +74,13 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 
     def steps(plant: PlantParameters) -> TimeGrid:
         """Time grid: steps that resolve the gas, a whole number per sample of the controller."""
-        volume = smallest_chamber(*(vented_chambers(device, plant, angle) for angle in (LOWEST_ANGLE, HIGHEST_ANGLE)))
+        model = ACTUATORS[device.actuator.kind].model
+        room = plant.atmospheric_pressure
+        chamber = smallest_chamber(
+            *(filled_chambers(model, plant, angle, room, room) for angle in (LOWEST_ANGLE, HIGHEST_ANGLE))
+        )
         # Lines may be smaller than any chamber, and then fill first.
-        volume = volume if lines is None else smaller(volume, smaller(lines.volume_1, lines.volume_2))
+        volume = chamber if lines is None else smaller(chamber, smaller(lines.volume_1, lines.volume_2))
         return walk_step_counts(*times, plant, volume, scenario.stiffness), False, 1.0
 
     def start(plant: PlantParameters) -> PlantState:
@@ -136,12 +139,6 @@ def stiff_loads(run: Run) -> tuple[Problem, ...]:
         )
 
     return ((run.step > longest, line),)
-
-
-def vented_chambers(device: Device, plant: PlantParameters, angle: Any) -> Chambers:
-    """Return both chambers of a device at an angle [rad] and at atmospheric pressure."""
-    room = plant.atmospheric_pressure
-    return filled_chambers(ACTUATORS[device.actuator.kind].model, plant, angle, room, room)
 
 
 def gait_sensors_of(scenario: Scenario) -> GaitSensors:

@@ -122,6 +122,6 @@ def test_draws_that_leave_out_the_value_of_the_scenario_are_told(
     mean: str, count: int, rooms: tuple[dict[str, Any], ...]
 ) -> None:
     pressure = {"path": "supply.pressure", "kind": "normal", "mean": mean, "standard_deviation": "2 psi_d"}
-    told = left_out(study(pressure, *rooms, sample={"method": "random", "runs": 8}))
+    told = [*left_out(study(pressure, *rooms, sample={"method": "random", "runs": 8}))]
     assert len(told) == count
     assert all("which leaves out its value, 55 psi_g" in text for text in told)

@@ -73,15 +73,12 @@ class _ForOneRun(ast.NodeTransformer):
             return node
         return ast.copy_location(ast.Call(node.args[0], node.args[1:], node.keywords), node)
 
-    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
+    def visit_If(self, node: ast.If | ast.IfExp) -> Any:
         """Leave out what is done with columns."""
         self.generic_visit(node)
         return node.orelse if self.asks_for_columns(node.test) else node
 
-    def visit_If(self, node: ast.If) -> Any:
-        """Leave out what is done with columns."""
-        self.generic_visit(node)
-        return node.orelse if self.asks_for_columns(node.test) else node
+    visit_IfExp = visit_If  # noqa: N815  # the name is ast's
 
     def asks_for_columns(self, test: ast.expr) -> bool:
         """Return whether a condition asks whether numbers are columns."""
