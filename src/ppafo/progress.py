@@ -30,13 +30,14 @@ class Progress:
 
     def line(self) -> str:
         """Return the progress as text."""
-        words = [f"{self.activity} ..."] if self.activity and not self.total else [self.activity] * bool(self.activity)
+        begun = self.activity if self.total else f"{self.activity} ..."
+        words = [begun] if self.activity else []
         if self.total:
             total = f"{'at most ' if self.is_bound else ''}{self.total:,} {self.noun}"
             words.append(f"{self.done:,} of {total} ({100.0 * self.done / self.total:.0f} %)")
         if self.total and self.done > self.earlier and self.elapsed > 0.0:
             rate = (self.done - self.earlier) / self.elapsed
-            words += [f"{rate:,.0f} {self.noun}/s"] * (rate >= 10.0)
+            words += [f"{rate:,.0f} {self.noun}/s"] if rate >= 10.0 else []
             words.append(f"{time_text((self.total - self.done) / rate)} left")
         if self.failed:
             words.append(f"{self.failed:,} failed")

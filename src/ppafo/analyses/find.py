@@ -145,9 +145,7 @@ def find(
                 fault = f"the loop oscillates in every run {ends}"
                 why = _verdict(base, path, low, has_remedy=True)
             raise StudyError("; ".join(filter(None, (f"scenario '{base.name}': {fault}", why))))
-        row = index
-        if row is None:
-            row = int((np.nanargmin if limit.is_most else np.nanargmax)(rows["judged"]))
+        row = int((np.nanargmin if limit.is_most else np.nanargmax)(rows["judged"])) if index is None else index
         # A loop that fails even at the nearest value is why no value meets the condition.
         shown = [row] if (limit.text == ask.FOLLOWS if index is not None else rows["is_missed"][row]) else []
         if outer is not None:

@@ -22,8 +22,11 @@ from ppafo.analyses.endurance.discharge import TIME_IS_UP, discharge
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.torque_loop import proportional_gain
+from ppafo.control.walking.catalog import walking_controllers
 from ppafo.documents.json_text import fields_of
+from ppafo.documents.toml_text import table_lines
 from ppafo.errors import ParameterError, StudyError
+from ppafo.loading import load_scenario, reloaded, usage_text
 from ppafo.model.plant import pressure_for_torque
 from ppafo.parameters.bottles.bottle import Bottle
 from ppafo.progress import Progress, Report
@@ -35,14 +38,15 @@ from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.motion_kind import LawSignals
-from ppafo.simulation.numbers import NOISE_SEED, number_at, with_numbers
+from ppafo.simulation.numbers import NOISE_SEED, declared_numbers, number_at, with_numbers
 from ppafo.simulation.simulate import simulate
 from ppafo.simulation.torque_loop import LoopLink, LoopParts
 from ppafo.simulation.tracking import REVERSALS, most_reversals
 from ppafo.simulation.tracking.rule import command_turning
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.studies.draws import seeds_of_noise
-from ppafo.units.shown import in_units
+from ppafo.units import split_quantity
+from ppafo.units.shown import in_units, written_text
 from ppafo.version import __version__
 from ppafo.walking.bottle.coupling import Schedule
 
@@ -608,11 +612,51 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                 size=(5.8, 2.5),
                 is_detail=True,
             ),
+            Section("To use it", code=usage_of(sizing.problem, sizing.choice)) if sizing.choice else Section(""),
             Section("How to read it", said=_READING, is_detail=True),
         ),
         found=sizing,
         passed=sizing.choice is not None,
         files={} if sizing.recording is None else {"suggested.csv": partial(marked_csv_bytes, sizing.recording)},
+    )
+
+
+def usage_of(problem: SizingProblem, choice: SizedValve) -> str:
+    """Return the command to walk with a suggestion, and its valve as tables of a parameter set.
+
+    A law that does not walk leaves its kind and gains to the walk, a device of another set has the tables alone.
+    """
+    scenario = problem.scenario
+    declared = declared_numbers(scenario)
+    valve = problem.valves[choice.name]
+    law = choice.gains if scenario.controller.kind in walking_controllers() else {}
+    texts = {
+        path: written_text(number, declared[path].unit)
+        for path, number in {**valve, "supply.pressure": choice.pressure, **law}.items()
+    }
+    overrides = [
+        *(f"{path}={text}" for path, text in texts.items()),
+        *([f"controller.kind={scenario.controller.kind}"] if law else []),
+    ]
+    entries = {
+        path.rpartition(".")[2]: dict(zip(("value", "unit"), split_quantity(texts[path]), strict=True))
+        | {"origin": "assumed", "source": "design"}
+        for path, number in valve.items()
+        if number != declared[path].default
+    }
+    walk = load_scenario("proportional")
+    # Another device has other walks, or none.
+    lines = (
+        [usage_text(reloaded(walk, overrides)), ""]
+        if walk.origin.parameter_set == scenario.origin.parameter_set
+        else []
+    )
+    return "\n".join(
+        (
+            *lines,
+            "# in a parameter set; origin and source of what a data sheet has are yours to give",
+            *table_lines(f"valves.{choice.name}", {"kind": scenario.device.valve.kind, **entries}),
+        )
     )
 
 

@@ -236,9 +236,8 @@ def _step_panels(reproduction: Reproduction) -> list[Panel]:
     at = [_MILLISECONDS * float(recording.time[index]) for index in step_events(recording) or ()]
     synthetic = None if isinstance(reproduction.synthetic, str) else reproduction.synthetic.step
     atmosphere = reproduction.step.scenario.device.supply.atmospheric_pressure
-    end = _MILLISECONDS * float(recording.time[-1])
-    if at:
-        end = min(end, at[1] * (1.0 + _SHOWN_AFTER_STOP))
+    last = _MILLISECONDS * float(recording.time[-1])
+    end = min(last, at[1] * (1.0 + _SHOWN_AFTER_STOP)) if at else last
     limits = -_SHOWN_BEFORE_STEP * end, end
     lines = [Mark("at", x=time, colour=style.GREY, style=_EVENT) for time in at]
     # The first panel has the names of the events, at angles [deg] where nothing else is drawn at their time.

@@ -112,10 +112,9 @@ def plant_of(scenario: Scenario) -> PlantAlone:
     program = replace(program, meters=(), traced=outputs, rests_whole=rests_whole)
     beginnings = (*_REPLACED, _PATH) if is_turned else _REPLACED
     replaced = {setting.path for setting in library.settings if setting.path.startswith(beginnings)}
-    library = replace(library, program=ExportedProgram(program, ()), rules=())
-    if is_turned:
-        # The inputs that turn a joint are held to its stops at each step.
-        library = replace(library, checking=None)
+    # The inputs that turn a joint are held to its stops at each step.
+    checking = None if is_turned else library.checking
+    library = replace(library, program=ExportedProgram(program, ()), rules=(), checking=checking)
     alone = PlantAlone(library, drive, frozenset(replaced.union(_WITHOUT_EFFECT)), plant.controller.period)
     return replace(alone, library=replace(library, api=_api_of(alone)))
 

@@ -358,10 +358,12 @@ def without_drop_outs(
         if name in LOADS:
             loaded = [(stride, _ABOUT_STANCE * stride.time) for stride in covered[name]]
             spans = [(stride.start + slack, stride.toe_off - slack) for stride, slack in loaded]
-        columns = [(column, table.columns[column]) for column in signal.columns]
-        if name in LOADS and len(columns) > 1:
-            # Plates that are summed rest in turn, so their sum is looked at.
-            columns = [(" + ".join(signal.columns), np.sum([np.abs(values) for _, values in columns], axis=0))]
+        # Plates that are summed rest in turn, so their sum is looked at.
+        columns = (
+            [(" + ".join(signal.columns), np.sum([np.abs(table.columns[each]) for each in signal.columns], axis=0))]
+            if name in LOADS and len(signal.columns) > 1
+            else [(column, table.columns[column]) for column in signal.columns]
+        )
         for column, values in columns:
             for start, end in constant_stretches(table.time, values, spans):
                 what = f"column {column!r} of {name} is constant from {start:.4g} to {end:.4g} s"

@@ -99,9 +99,8 @@ def frames_figure(comparison: WalkComparison) -> "Figure":
         worn = comparison.with_device
         width = width / scale
         height = height / scale
-        remark = "outline: healthy foot; cross: toes below ground in mid-swing"
         # About 15 letters of the remark go on an inch.
-        remark = "\n".join(textwrap.wrap(remark, round(15.0 * width)))
+        remark = textwrap.fill("outline: healthy foot; cross: toes below ground in mid-swing", round(15.0 * width))
         for text, top, letters, colour in (
             (f"{worn.scenario.name}: one stride", 0.12, 11.0, BLACK),
             (remark, 0.36, 9.0, GREY),
