@@ -22,8 +22,11 @@ from ppafo.analyses.endurance.discharge import TIME_IS_UP, discharge
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.torque_loop import proportional_gain
+from ppafo.control.walking.catalog import walking_controllers
 from ppafo.documents.json_text import fields_of
+from ppafo.documents.toml_text import table_lines
 from ppafo.errors import ParameterError, StudyError
+from ppafo.loading import load_scenario, reloaded, usage_text
 from ppafo.model.plant import pressure_for_torque
 from ppafo.parameters.bottles.bottle import Bottle
 from ppafo.progress import Progress, Report
@@ -35,14 +38,15 @@ from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.motion_kind import LawSignals
-from ppafo.simulation.numbers import NOISE_SEED, number_at, with_numbers
+from ppafo.simulation.numbers import NOISE_SEED, declared_numbers, number_at, with_numbers
 from ppafo.simulation.simulate import simulate
 from ppafo.simulation.torque_loop import LoopLink, LoopParts
 from ppafo.simulation.tracking import REVERSALS, most_reversals
 from ppafo.simulation.tracking.rule import command_turning
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.studies.draws import seeds_of_noise
-from ppafo.units.shown import in_units
+from ppafo.units import split_quantity
+from ppafo.units.shown import in_units, written_text
 from ppafo.version import __version__
 from ppafo.walking.bottle.coupling import Schedule
 
@@ -92,6 +96,9 @@ _ORIGINS = {
     "simulated": "simulated, not measured",
     "synthetic": "synthetic, not measured",
 }
+_WALK = "proportional"
+"""Walk in which a suggestion is used."""
+_IN_SET = "\n# in a parameter set; origin and source of what a data sheet has are yours to give"
 _READING = (
     "The chosen pressure is the lowest that holds the whole peak with the smallest bottle, if one lasts, else the "
     "lowest with which the smallest bottle suffices; the table also has the lowest pressure that keeps the error "
@@ -608,12 +615,39 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                 size=(5.8, 2.5),
                 is_detail=True,
             ),
+            Section("To use it" if sizing.choice else "", code=usage_of(sizing)),
             Section("How to read it", said=_READING, is_detail=True),
         ),
         found=sizing,
         passed=sizing.choice is not None,
         files={} if sizing.recording is None else {"suggested.csv": partial(marked_csv_bytes, sizing.recording)},
     )
+
+
+def usage_of(sizing: Sizing) -> str:
+    """Return the command to walk with the suggestion, and its valve as tables of a parameter set; "" without one.
+
+    A law that does not walk leaves its kind and gains to the walk, a device of another set has the tables alone.
+    """
+    if sizing.choice is None:
+        return ""
+    scenario = sizing.problem.scenario
+    kind = scenario.controller.kind
+    declared = declared_numbers(scenario)
+    valve = sizing.problem.valves[sizing.choice.name]
+    law = sizing.choice.gains if kind in walking_controllers() else {}
+    numbers = {**valve, "supply.pressure": sizing.choice.pressure, **law}
+    texts = {path: written_text(number, declared[path].unit) for path, number in numbers.items()}
+    overrides = [f"{path}={text}" for path, text in texts.items()] + ([f"controller.kind={kind}"] if law else [])
+    table: dict[str, Any] = {"kind": scenario.device.valve.kind}
+    for path in (path for path, number in valve.items() if number != declared[path].default):
+        value, unit = split_quantity(texts[path])
+        table[path.rpartition(".")[2]] = {"value": value, "unit": unit, "origin": "assumed", "source": "design"}
+    walk = load_scenario(_WALK)
+    # Another device has other walks, or none.
+    is_of_walk = (walk.origin.parameter_set, walk.device.valve.kind) == (scenario.origin.parameter_set, table["kind"])
+    used = [usage_text(reloaded(walk, overrides)), _IN_SET] if is_of_walk else []
+    return "\n".join([*used, *table_lines(f"valves.{sizing.choice.name}", table)])
 
 
 def _tables(sizing: Sizing) -> tuple[Section, Section]:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import re
+import shlex
 import shutil
 import tomllib
 from importlib import resources
@@ -24,6 +25,7 @@ from ppafo.analyses.design.search import (
     finding_of,
     lasting_bottle,
     smallest_bottle,
+    usage_of,
 )
 from ppafo.control.profiles import KNOTS
 from ppafo.errors import PpafoError
@@ -34,7 +36,9 @@ from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.ensemble import COMPLETED
+from ppafo.simulation.numbers import number_at
 from ppafo.storage import write_csv
+from ppafo.units import base_value
 
 SHIPPED = Path(__file__).parents[4] / "src" / "ppafo" / "analyses" / "design" / "library" / "push-off.toml"
 ATMOSPHERE = 101325.0
@@ -107,6 +111,19 @@ def test_the_suggestion_holds_the_whole_peak_at_the_lowest_pressure_that_does(si
     assert sizing.choice is not None
     assert sizing.choice.pressure == pytest.approx(ATMOSPHERE + 4.0 / TORQUE_CONSTANT)
     assert "cut off" not in sizing.summary
+
+
+def test_the_suggestion_walks_as_printed_and_its_valve_is_one_of_a_parameter_set(sizing: Sizing) -> None:
+    assert sizing.choice is not None
+    command, _, table = usage_of(sizing).partition("# in a parameter set")
+    walk = load_scenario("proportional", shlex.split(command.splitlines()[0])[4::2])
+    valve = sizing.problem.valves[sizing.choice.name]
+    for path, number in {**valve, **sizing.choice.gains, "supply.pressure": sizing.choice.pressure}.items():
+        assert number_at(walk, path) == pytest.approx(number)
+    kind, *entries = tomllib.loads(table.partition("\n")[2])["valves"][sizing.choice.name].items()
+    assert kind == ("kind", "proportional")
+    for name, entry in entries:
+        assert base_value(entry["value"], entry["unit"]) == pytest.approx(valve[f"valve.{name}"])
 
 
 def test_a_sizing_is_drawn_like_any_answer(sizing: Sizing) -> None:
