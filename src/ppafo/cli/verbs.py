@@ -33,10 +33,10 @@ if TYPE_CHECKING:
     from ppafo.report.finding import Finding
 
 Interface = Annotated[
-    Literal["loop", "plant"],
+    Literal["loop", "plant", "controller"],
     Word(
-        "{loop,plant}",
-        help="the closed loop, or the plant alone under a command and the motion of its ankle; default loop",
+        "{loop,plant,controller}",
+        help="the closed loop, the plant alone under command and motion, or the law alone; default loop",
     ),
 ]
 
@@ -169,10 +169,11 @@ def export_c(
     expected.csv); next: make -C library check
     """
     from ppafo.exports.c_library import c_library
+    from ppafo.exports.c_library.law import law_library
     from ppafo.exports.c_library.plant import plant_library
     from ppafo.loading import load_scenario
 
-    library_of = {"loop": c_library, "plant": plant_library}[interface]
+    library_of = {"loop": c_library, "plant": plant_library, "controller": law_library}[interface]
     next_step = f"make -C {shlex.quote(str(out))} check"
     return export(out, "export c", lambda: library_of(load_scenario(scenario, overrides)), lambda _files: next_step)
 
@@ -195,13 +196,13 @@ def export_fmu(
     >>> print(export_fmu("step-response", out=Path("step.fmu")).text.splitlines()[0])
     written: step.fmu; next: fmpy simulate step.fmu --output-file step.csv
     """
-    from ppafo.exports.fmu.interface import closed_loop, plant_alone
+    from ppafo.exports.fmu.interface import closed_loop, law_alone, plant_alone
     from ppafo.exports.fmu.platforms import host_platform
     from ppafo.exports.fmu.unit import functional_unit
     from ppafo.loading import load_scenario
     from ppafo.storage.files import write_file
 
-    interface_of = {"loop": closed_loop, "plant": plant_alone}[interface]
+    interface_of = {"loop": closed_loop, "plant": plant_alone, "controller": law_alone}[interface]
     names = [host_platform()] if platforms is None else platforms.split(",")
     # None is a computer that no platform of FMI stands for: its unit has sources alone.
     chosen = list(dict.fromkeys(name.strip() for name in names if name is not None))

@@ -10,7 +10,7 @@ import inspect
 import itertools
 import re
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
 
@@ -73,6 +73,8 @@ def c_source(
     for number, function in enumerate(functions):
         if writer.locals[function.name] & names_of_structs:
             bodies[number] = writer.function(function)
+    if around is not None:
+        bodies = _called(bodies, [writer.functions.get(function.name, function.name) for function in functions], around)
     parts = [_PART] if any(f"{PART}(" in body for body in bodies) else []
     text = "\n".join([*parts, *(line for kind in writer.structs for line in writer.written_struct(kind)), *bodies])
     if around is None:
@@ -80,6 +82,15 @@ def c_source(
     before = before.replace("#if !defined(PPAFO_INLINE)\n", "", 1).replace("#endif\n", "", 1)
     before = _prelude_for(before, text + around)
     return "\n".join([_comment(title), before, text]).replace("PPAFO_INLINE", "static")
+
+
+def _called(bodies: Sequence[str], names: Sequence[str], around: str) -> list[str]:
+    """Return the functions that others after them or the text around call; of a dropped value none is called."""
+    kept: list[str] = []
+    for body, name in zip(reversed(bodies), reversed(names), strict=True):
+        if re.search(rf"\b{name}\(", "\n".join([*kept, around])):
+            kept.append(body)
+    return kept[::-1]
 
 
 _DEFINES = re.compile(r"(?:^|\s|\*)(ppafo_\w+)\(|\} (ppafo_\w+);|#define (PPAFO_\w+)")

@@ -45,8 +45,9 @@ class _DampedProportionalState(NamedTuple):
 def learnt_command(parameters: _DampedProportionalParameters, elapsed: float) -> float:
     """Command [-] of the table at a time since the start [s]: linear between knots, constant after the last knot."""
     position = min(elapsed / parameters.knot_spacing, KNOTS - 1.0)
-    # The last knot has no line after it: the line before it is used up to its end.
-    before = min(int(position), KNOTS - 2)
+    # The last knot has no line after it: the line before it is used up to its end. A time that is no number reads no
+    # memory but the table.
+    before = max(0, min(int(position), KNOTS - 2))
     fraction = position - before
     first = parameters.knots[before]
     return first + fraction * (parameters.knots[before + 1] - first)

@@ -57,17 +57,8 @@ def library_of(scenario: Scenario) -> Library:
     Raises ProgramError for a controller that is a Python object or in fixed point, and ScenarioError for a walk that
     cannot be exported.
     """
+    check_law(scenario)
     is_walk = scenario.motion.motion_kind.layout == WALK
-    kind = scenario.controller.kind
-    if scenario.controller.is_outside:
-        raise ProgramError(
-            f"{scenario.name}: a controller that is a Python object cannot be exported; export the plant only "
-            f"({argument_text('interface', 'plant')}), or declare the control law as a controller kind of a plugin"
-        )
-    if not is_walk and CONTROLLERS[kind].plan is not None:
-        raise ProgramError(
-            f"{scenario.name}: a fixed-point controller cannot be exported as a C library; use 'ppafo export firmware'"
-        )
     if is_walk:
         # The code of walks is loaded for a walk alone; what cannot be exported is said before anything is planned.
         from ppafo.exports.c_library import walk_preparation as of_walk
@@ -148,6 +139,20 @@ def library_of(scenario: Scenario) -> Library:
         joint=device.joint,
         actuator=device.actuator.kind,
     )
+
+
+def check_law(scenario: Scenario) -> None:
+    """Raise ProgramError for a controller that is a Python object or in fixed point."""
+    kind = scenario.controller.kind
+    if scenario.controller.is_outside:
+        raise ProgramError(
+            f"{scenario.name}: a controller that is a Python object cannot be exported; export the plant only "
+            f"({argument_text('interface', 'plant')}), or declare the control law as a controller kind of a plugin"
+        )
+    if scenario.motion.motion_kind.layout != WALK and CONTROLLERS[kind].plan is not None:
+        raise ProgramError(
+            f"{scenario.name}: a fixed-point controller cannot be exported as a C library; use 'ppafo export firmware'"
+        )
 
 
 def names_of_switch(effect: Effect) -> tuple[str, ...]:

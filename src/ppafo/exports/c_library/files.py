@@ -34,7 +34,7 @@ OUTPUTS = {name: (channel.unit, channel.summary) for name, channel in CHANNELS.i
 SAME_METRIC = 1.0e-12
 """Accepted relative difference between a metric in C and in Python; sums are rounded in another order."""
 UNITS = {"1": "-", "Pa_a": "Pa, absolute", "Pa_d": "Pa, a difference"}
-_FILES = {"Makefile": "Makefile", "CMakeLists.txt": "CMakeLists.txt", "check.c": "check.c"}
+_FILES = {"Makefile": "Makefile", "CMakeLists.txt": "CMakeLists.txt"}
 """Templates of the files in every library, with their names in the library."""
 _CHECKED = """\
     {
@@ -91,14 +91,18 @@ def library_files(library: Library) -> dict[str, bytes]:
     name = library.name
     words = _words(library, name)
     api = library.api
-    sources = {api.header: f"{name}.h", api.main: "main.c", api.page: "README.md", **_FILES}
+    sources = {api.header: f"{name}.h", api.main: "main.c", api.page: "README.md", api.check: "check.c", **_FILES}
     texts = {target: filled(template(_FOLDER, source), words) for source, target in sources.items()}
     texts["LICENSE"] = template(_FOLDER, "LICENSE")
-    head = f'#include "{name}.h"\n\n#include <string.h>\n\n'
+    head = f'#include "{name}.h"\n\n'
     title = f"{library.title}: functions of a run in ppafo {__version__}. Generated: do not edit."
     # The interface is written around the functions, whose names must not hide its own.
-    interface = "".join(filled(template(_FOLDER, file), words) for file in ("interface.c", api.source))
-    functions = c_text_of_run(library, title, interface)
+    interface = "".join(filled(template(_FOLDER, file), words) for file in api.sources)
+    if api.functions is None:
+        head += "#include <string.h>\n\n"
+        functions = c_text_of_run(library, title, interface)
+    else:
+        functions = api.functions(library, title, interface)
     texts[f"{name}.c"] = f"{head}{functions}\n{interface}"
     return {file: text.encode() for file, text in sorted(texts.items())}
 
@@ -136,8 +140,8 @@ def _words(library: Library, name: str) -> dict[str, str]:
             other_program.append((f"!({' || '.join(f'settings->{each} > 0.0' for each in names)})", was_above))
         else:
             other_program += [(f"settings->{each} > 0.0", each) for each in names]
-    # Every scenario has a supply pressure, which is what a user would try first.
-    (pressure,) = [setting for setting in settings if setting.name == "supply_pressure"]
+    # Every plant has a supply pressure, which is what a user would try first.
+    tried = next((setting for setting in settings if setting.name == "supply_pressure"), settings[0])
     return {
         "never": repr(NEVER_FAILED),
         "same_moment": repr(SAME_MOMENT),
@@ -151,14 +155,14 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "description": "\n * ".join(textwrap.wrap(in_comment(library.description), 110)),
         "about": in_markdown(library.description),
         "version": __version__,
-        "settings": _members(fields),
-        "outputs": _members(
+        "settings": members_of(fields),
+        "outputs": members_of(
             (
                 ("time", "s", "since the start"),
                 *((output, OUTPUTS[output][0], library.worded(OUTPUTS[output][1])) for output in program.outputs),
             )
         ),
-        "metrics": _members((kind.name, kind.unit, library.worded(kind.summary)) for kind in program.metrics),
+        "metrics": members_of((kind.name, kind.unit, library.worded(kind.summary)) for kind in program.metrics),
         "table": "\n".join(table),
         "relations": _returning((f"!({condition})", setting) for condition, setting in relations),
         "is_whole": _IS_WHOLE if any("is_whole(" in condition for condition, _ in relations) else "",
@@ -172,7 +176,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
             f'"{library.worded(kind.summary)}");'
             for kind in program.metrics
         ),
-        "example": f"{pressure.name} = {pressure.value!r};",
+        "example": f"{tried.name} = {tried.value!r};",
         "channel_names": ", ".join(f'"{output}"' for output in outputs),
         "metric_names": ", ".join(f'"{kind.name}"' for kind in program.metrics) or '""',
         "allowed": repr(SAME_METRIC),
@@ -194,7 +198,7 @@ def _returning(conditions: Iterable[tuple[str, str]]) -> str:
     return "\n".join(f'    if ({condition}) {{\n        return "{name}";\n    }}' for condition, name in conditions)
 
 
-def _members(items: Iterable[tuple[str, str, str]]) -> str:
+def members_of(items: Iterable[tuple[str, str, str]]) -> str:
     """C declarations of struct members, each with unit and meaning as a comment."""
     lines = []
     for name, unit, meaning in items:

@@ -130,16 +130,21 @@ Switch = tuple[Sequence[str], bool]
 
 @dataclass(frozen=True, slots=True)
 class LibraryApi:
-    """API variant of an exported library: header, example, README and source templates; ``words`` fill them."""
+    """API variant of an exported library: header, example, README, source and check templates; ``words`` fill them.
+
+    ``functions(library, title, around)`` returns the C behind the sources; None for the functions of a run.
+    """
 
     header: str
     main: str
     page: str
-    source: str
+    sources: tuple[str, ...]
     words: Mapping[str, str] = field(default_factory=dict)
+    check: str = "check.c"
+    functions: Callable[["Library", str, str], str] | None = None
 
 
-LOOP = LibraryApi("interface.h", "main.c", "README.md", "loop.c")
+LOOP = LibraryApi("interface.h", "main.c", "README.md", ("interface.c", "loop.c"))
 """API of the closed loop, which advances from sample to sample."""
 
 

@@ -55,12 +55,12 @@ Assignment = tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True)
-class _Drive:
+class Drive:
     """External drive of a plant: its command, its other inputs, and the motion of its joint within a step.
 
     ``motion`` describes the motion in words. ``settings`` assigns the first inputs to settings of the run.
     ``parameters`` assigns the inputs to engine parameters at each step, which starts at ``time`` [s] and takes
-    ``length`` [s].
+    ``length`` [s]. ``steps`` is the path of the setting for the time from input to input.
     """
 
     motion: str
@@ -68,6 +68,7 @@ class _Drive:
     inputs: tuple[Input, ...] = ()
     settings: tuple[Assignment, ...] = ()
     parameters: tuple[Assignment, ...] = ()
+    steps: str = STEPS
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,7 @@ class PlantAlone:
     """
 
     library: Library
-    drive: _Drive
+    drive: Drive
     hidden: frozenset[str]
     step: float
 
@@ -101,6 +102,8 @@ def plant_of(scenario: Scenario) -> PlantAlone:
         plant = replace(plant, motion=PrescribedMotion(ProfileChoice("ramp_hold", settings)))
     library = library_of(plant)
     drive = _drive_of(scenario.motion, {setting.path: setting for setting in library.settings})
+    of_steps = ((name, f"{{settings}}->{c_identifier(STEPS)}") for name in _AS_STEPS)
+    drive = replace(drive, settings=(*of_steps, *drive.settings))
     input_names = {variable.name for variable in (drive.command, *drive.inputs)}
     references = {kind.reference for kind in CONTROLLED.values()}
     outputs = tuple(name for name in library.program.outputs if name not in input_names | references)
@@ -121,23 +124,23 @@ def plant_of(scenario: Scenario) -> PlantAlone:
 
 
 @singledispatch
-def _drive_of(_motion: Motion, _settings: Mapping[str, ExportParameter]) -> _Drive:
+def _drive_of(_motion: Motion, _settings: Mapping[str, ExportParameter]) -> Drive:
     """Return the external drive of a plant with this motion, within the ranges of its settings: here a walk."""
-    return _Drive(motion="The leg follows its gait.", command=WALKING_COMMAND)
+    return Drive(motion="The leg follows its gait.", command=WALKING_COMMAND)
 
 
 @_drive_of.register
-def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, ExportParameter]) -> _Drive:
+def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, ExportParameter]) -> Drive:
     """Return the drive of a prescribed joint: inputs angle and rate if locked, no input if on a path."""
     if motion.locked_angle is None:
-        return _Drive(motion="The ankle follows the prescribed motion of the scenario.")
+        return Drive(motion="The ankle follows the prescribed motion of the scenario.")
     stop_1 = settings["actuator.angle_min"].value
     stop_2 = settings["actuator.angle_max"].value
     # So fast that the short ramp of the first angle still ends within what a level may be.
     fastest = (settings["motion.profile.level"].quantity.maximum - max(abs(stop_1), abs(stop_2))) / _FIRST_RAMP
     start = motion.locked_angle
     summary = "angle of the ankle, 90 deg neutral, growing in plantarflexion"
-    return _Drive(
+    return Drive(
         motion=(
             "Within a step the angle changes at the given angular velocity; the next step starts at the "
             "next given angle."
@@ -162,7 +165,7 @@ def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, ExportParamete
 
 
 @_drive_of.register
-def _torque_drive(motion: FreeMotion, settings: Mapping[str, ExportParameter]) -> _Drive:
+def _torque_drive(motion: FreeMotion, settings: Mapping[str, ExportParameter]) -> Drive:
     """Return the drive of a free joint: T_ex on a vane without leg, or T_2, opposed to T_ex, on the ankle of a leg."""
     name = "external_torque"
     summary = "T_ex, above 0 against plantarflexion"
@@ -175,7 +178,7 @@ def _torque_drive(motion: FreeMotion, settings: Mapping[str, ExportParameter]) -
         start = motion.leg.ankle_torque
     limits = settings[f"motion.{name}"].quantity
     torque = Input(name, "N m", f"torque on the ankle, {summary}", start, limits.minimum, limits.maximum)
-    return _Drive(
+    return Drive(
         motion="The torque is constant until the next value.",
         inputs=(torque,),
         settings=((c_identifier(f"motion.{name}"), f"{{{name}}}"),),
@@ -235,17 +238,14 @@ def _api_of(alone: PlantAlone) -> LibraryApi:
         "step": f"{alone.step:g}",
         "first": "".join(f"    before.{setting} = before.{c_identifier(STEPS)};\n" for setting in _AS_STEPS),
     }
-    return LibraryApi("plant.h", "plant_main.c", "plant_README.md", "plant.c", words)
+    return LibraryApi("plant.h", "plant_main.c", "plant_README.md", ("interface.c", "plant.c"), words)
 
 
 def follow_lines(alone: PlantAlone, settings: str, inputs: Mapping[str, str]) -> str:
     """Return C lines that assign the ``inputs``, C expressions by name, to the struct at pointer ``settings``."""
     return "\n".join(
         f"    {settings}->{field} = {expression.format(settings=settings, **inputs)};"
-        for field, expression in (
-            *((name, f"{{settings}}->{c_identifier(STEPS)}") for name in _AS_STEPS),
-            *alone.drive.settings,
-        )
+        for field, expression in alone.drive.settings
     )
 
 

@@ -104,10 +104,6 @@ def c_text_of_run(library: Library, title: str, around: str) -> str:
 
     The text ``around`` declares the structs of settings and metrics, with the name of the library as prefix.
     """
-    from ppafo.translation.c99 import c_source, documents_of
-    from ppafo.translation.c_terms import is_free
-    from ppafo.translation.walk import walk_module
-
     # Array functions are specialised for a single run.
     collector = SourceCollector(
         INLINE,
@@ -138,6 +134,26 @@ def c_text_of_run(library: Library, title: str, around: str) -> str:
         "reach": (parameters, FLOAT, struct_of_numbers("run_reach", ["low", "high"])),
         "check_profiles": (settings_row, struct_of_numbers("run_fault", ["place"])),
     }
+    return readable_c(library, collector, composed, types, (settings_row, outputs, metrics_row), title, around)
+
+
+def readable_c(
+    library: Library,
+    collector: SourceCollector,
+    composed: str,
+    types: Mapping[str, tuple[Type, ...]],
+    declared: Iterable[RowReference],
+    title: str,
+    around: str,
+) -> str:
+    """Return the C of the ``composed`` functions, with short names and the comments of their sources.
+
+    ``types`` has the parameter types of the entries; the text ``around`` declares the structs ``declared``.
+    """
+    from ppafo.translation.c99 import c_source, documents_of
+    from ppafo.translation.c_terms import is_free
+    from ppafo.translation.walk import walk_module
+
     documents = {name: library.worded(text) for name, text in (documents_of(collector) | _DOCUMENTS).items()}
     # A short name is taken only where it is unambiguous and C leaves it free; all others keep their module's path.
     own = {name: re.sub(r"\W", "_", owner.__qualname__).strip("_") for name, owner in collector.owners.items()}
@@ -153,7 +169,7 @@ def c_text_of_run(library: Library, title: str, around: str) -> str:
         documents,
         title,
         names=short,
-        declared={kind.row.name: kind.row.name for kind in (settings_row, outputs, metrics_row)},
+        declared={kind.row.name: kind.row.name for kind in declared},
         around=around,
     )
 
@@ -171,6 +187,8 @@ _DOCUMENTS = {
     "run_reach": "Range of a quantity.",
     "reach": "Lowest and highest torque of the actuator at an angle.",
     "check_profiles": "Setting that breaks a rule on profiles.",
+    "decide": "Next state of the law, with its command, from settings, state, reference and measurement.",
+    "observe": "Torque of a measurement, from its angle and pressures.",
     "follow": "Update settings at their default that depend on other settings.",
 }
 
@@ -191,7 +209,9 @@ def _names_around() -> frozenset[str]:
         if any("@name@" in text for text in of_folder)
         for text in of_folder
     )
-    return frozenset(("advance", "metrics", "prepare", "follow", "check_profiles", "reach")).union(*found)
+    return frozenset(("advance", "metrics", "prepare", "follow", "check_profiles", "reach", "decide", "observe")).union(
+        *found
+    )
 
 
 _FUNCTION = re.compile(r"^(?:static )?[\w ]+\b\*?(\w+)\(", re.MULTILINE)

@@ -1,10 +1,13 @@
 """Interface of an FMU, closed loop or plant driven by the importing tool, and its variables."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 from ppafo.exports.c_library import library_of
-from ppafo.exports.c_library.files import OUTPUTS
+from ppafo.exports.c_library.files import OUTPUTS, expected_csv
+from ppafo.exports.c_library.law import law_of, samples_csv
 from ppafo.exports.c_library.library import ExportParameter, Library
 from ppafo.exports.c_library.plant import Input, PlantAlone, half_open, plant_of
 from ppafo.model.controlled import CONTROLLED
@@ -37,13 +40,13 @@ _LARGEST_LIMIT = 1.0e308
 class Interface:
     """Interface of an FMU: its library, whose settings, outputs and metrics are variables, and its plant, if alone.
 
-    ``run`` is the Python run for comparison, under the command ``EXAMPLE`` for a plant. ``step`` [s] is the usual
-    communication step, of which those of a plant must be multiples; ``duration`` [s] is the length of the default
-    experiment. A closed loop has a clock of its controller.
+    ``table`` returns samples of a run for comparison as CSV, inputs among them, under the command ``EXAMPLE`` for a
+    plant. ``step`` [s] is the usual communication step, of which those of a plant or a law must be multiples;
+    ``duration`` [s] is the length of the default experiment. A closed loop has a clock of its controller.
     """
 
     library: Library
-    run: Scenario
+    table: Callable[[], bytes]
     step: float
     duration: float
     plant: PlantAlone | None = None
@@ -58,7 +61,8 @@ def closed_loop(scenario: Scenario) -> Interface:
     """Return the interface of a complete scenario or walk with its controller, without inputs."""
     library = library_of(scenario)
     times = {setting.path: setting.value for setting in library.settings}
-    return Interface(library, scenario, times["run.output_interval"], times["run.duration"])
+    table = partial(expected_csv, scenario, library.program.outputs)
+    return Interface(library, table, times["run.output_interval"], times["run.duration"])
 
 
 def plant_alone(scenario: Scenario) -> Interface:
@@ -67,7 +71,17 @@ def plant_alone(scenario: Scenario) -> Interface:
     The command is always an input, in all other cases the only one. ``export c`` writes the same plant.
     """
     plant = plant_of(scenario)
-    return Interface(plant.library, half_open(scenario), plant.step, scenario.run.duration, plant)
+    table = partial(expected_csv, half_open(scenario), plant.library.program.outputs)
+    return Interface(plant.library, table, plant.step, scenario.run.duration, plant)
+
+
+def law_alone(scenario: Scenario) -> Interface:
+    """Return the interface of the law; inputs are reference and measurement, the output is the command.
+
+    A step gives the command of the sample at its beginning. ``export c`` writes the same law.
+    """
+    law = law_of(scenario)
+    return Interface(law.library, partial(samples_csv, scenario, 1), law.step, scenario.run.duration, law)
 
 
 @dataclass(frozen=True, slots=True)

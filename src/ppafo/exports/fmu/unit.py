@@ -17,7 +17,7 @@ from typing import Any
 
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports import filled, template
-from ppafo.exports.c_library.files import expected_csv, library_files
+from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.plant import EXAMPLE, follow_lines
 from ppafo.exports.fmu.description import build_description_of_fmi3, model_description
 from ppafo.exports.fmu.interface import Interface, tuning_of, variability_of, variables_of
@@ -41,8 +41,8 @@ _LOOP = (
     "the run, the metrics of ramp and hold keep the times of the initial reference.",
 )
 _PLANT = (
-    "Inputs are read at the beginning of a communication step. It is a multiple of <code>run.step</code>; the engine "
-    "divides it further where its error asks for that. {motion} There is no stop time.",
+    "Inputs are read at the beginning of a communication step, a multiple of <code>{steps}</code>. {motion} There is no "
+    "stop time.",
     "They take effect at the next communication step.",
 )
 """Time stepping of a closed loop and of a plant, and when changed parameters take effect, for the page of the unit."""
@@ -103,11 +103,12 @@ def check_unit(interface: Interface, fmi: int, token: str, library: bytes) -> No
 
     Raises ProgramError if it cannot be loaded, a call fails, or an output differs.
     """
-    head, *lines = expected_csv(interface.run, interface.library.program.outputs).decode().splitlines()
+    head, *lines = interface.table().decode().splitlines()
     rows = [[float(text) for text in line.split(",")] for line in lines]
     numbers = {variable.name: variable.number for variable in variables_of(interface)}
-    outputs = head.split(",")[1:]
+    columns = head.split(",")[1:]
     inputs = {item.name: EXAMPLE if item.name == "command" else item.start for item in interface.inputs}
+    outputs = [name for name in columns if name not in inputs]
     with temporary_folder("ppafo-unit", {"unit": library}) as folder:
         try:
             functions = ctypes.CDLL(str(Path(folder, "unit")))
@@ -118,12 +119,15 @@ def check_unit(interface: Interface, fmi: int, token: str, library: bytes) -> No
         with closing(_Instance(functions, fmi, token)) as instance:
             output_numbers = _array(c_uint, [numbers[name] for name in outputs])
             values = (c_double * len(outputs))()
-            status = instance.begin(
-                _array(c_uint, [numbers[name] for name in inputs]), _array(c_double, list(inputs.values()))
-            )
+            input_numbers = _array(c_uint, [numbers[name] for name in inputs])
+            status = instance.begin(input_numbers, _array(c_double, list(inputs.values())))
             previous_time = 0.0
-            for time, *expected in rows:
+            for time, *row in rows:
+                of_row = dict(zip(columns, row, strict=True))
+                expected = [of_row[name] for name in outputs]
+                inputs |= {name: of_row[name] for name in inputs if name in of_row}
                 if time > 0.0:
+                    status = status or instance.exchange("Set", input_numbers, _array(c_double, list(inputs.values())))
                     status = status or instance.advance(previous_time, time - previous_time)
                 status = status or instance.exchange("Get", output_numbers, values)
                 previous_time = time
@@ -159,7 +163,14 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
     sources = {name: content.replace(b"@token@", token.encode()) for name, content in sources.items()}
     main = f"fmi{fmi}.c"
     plant = interface.plant
-    time, tuning = _LOOP if plant is None else (_PLANT[0].format(motion=plant.drive.motion), _PLANT[1])
+    time, tuning = (
+        _LOOP
+        if plant is None
+        else (
+            _PLANT[0].format(motion=plant.drive.motion, steps=plant.drive.steps),
+            _PLANT[1],
+        )
+    )
     trials = "".join(f"<tr><td>{name}</td><td>{platform.trial}</td></tr>" for name, platform in chosen.items())
     words = {
         "title": html.escape(interface.library.title),
@@ -204,6 +215,7 @@ def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
     written = library_files(library)
     paths = "\n".join(f'    "{setting.path}",' for setting in library.settings)
     words = {
+        **library.api.words,
         "name": name,
         "NAME": name.upper(),
         "title": library.title,
@@ -218,14 +230,17 @@ def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
         "has_clock": "true" if plant is None else "false",
         "checked": "inertia, volumes and areas",
     }
-    templates = ["stepped.c", "closed_loop.c"]
+    templates = ["unit.c", "stepped.c", "closed_loop.c"]
     if plant is not None:
-        templates[1:] = ["plant_inputs.c", "plant.c"]
+        # A law has no run of its own, in which a unit could hold what it is at.
+        templates = [*([] if library.api.functions is None else ["law_run.c"]), "unit.c", "stepped.c"]
+        templates += ["plant_inputs.c", "plant.c"]
+        words["step_path"] = plant.drive.steps
         places = {variable.name: f"inputs[{index}]" for index, variable in enumerate(plant.inputs)}
         words["inputs"] = ", ".join(places.values())
         words["follow"] = follow_lines(plant, "settings", places)
         words["checked"] = "the limits of the inputs, inertia, volumes and areas"
-    unit = "\n".join(filled(template("ppafo.exports.fmu", file), words) for file in ("unit.c", *templates))
+    unit = "\n".join(filled(template("ppafo.exports.fmu", file), words) for file in templates)
     headers = files("ppafo.exports.fmu").joinpath("headers")
     return {
         f"{name}.h": written[f"{name}.h"],

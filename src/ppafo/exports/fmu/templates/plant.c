@@ -27,7 +27,7 @@ static bool go_to(unit *item, double time)
     }
     until = (int64_t)(wanted + 0.5);
     if (fabs(wanted - (double)until) > 1.0e-3) {
-        return refuse(item, "time %g s lies between the steps of the inputs: a communication step is a multiple of run.step, %g s",
+        return refuse(item, "time %g s lies between the steps of the inputs: a communication step is a multiple of @step_path@, %g s",
             time, step);
     }
     if (!are_inputs_numbers(item) || (item->now.is_stale && !renew(item))) {
