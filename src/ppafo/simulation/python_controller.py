@@ -38,22 +38,22 @@ class SampledRun:
         self._block = LaneBlock(
             load_program(program, effort_for(batch)), program, clock, batch.parameters, batch.states
         )
-        self._reference = _parameter_group(batch, "reference")
-        self._step = _parameter_group(batch, "timing").step
+        self._reference = parameter_group(batch, "reference")
+        self._step = parameter_group(batch, "timing").step
         self._rows = row_numbers(program.state_rows())
-        self._plant, self._sensors = (_parameter_group(batch, name) for name in ("plant", "sensors"))
+        self._plant, self._sensors = (parameter_group(batch, name) for name in ("plant", "sensors"))
         self.requests_torque = program.controller is OUTSIDE
         self._command_row = self._rows["controller_state.command" if self.requests_torque else "result.command"]
-        self._law = _parameter_group(batch, "controller") if self.requests_torque else None
+        self._law = parameter_group(batch, "controller") if self.requests_torque else None
         self._before = self._requested = OUTSIDE.initial
         if program.walks:
             self._last_measurement = NOTHING_SEEN
             # Gas temperatures of a walk are kept inside the compiled program alone.
             if program.is_thermal:
                 raise ScenarioError("a Python controller cannot run a walk with a thermal gas model")
-            self._gait_sensors = _parameter_group(batch, "gait_sensors")
+            self._gait_sensors = parameter_group(batch, "gait_sensors")
         else:
-            effects = [_parameter_group(batch, effect.name) for effect in program.effects]
+            effects = [parameter_group(batch, effect.name) for effect in program.effects]
             self._shown_signals = in_program(shown_signals, program, effects)
 
     @property
@@ -161,8 +161,8 @@ class SampledRun:
         return found
 
 
-def _parameter_group(batch: Batch, name: str) -> Any:
-    """NamedTuple of a group of parameters of the single run, as floats."""
+def parameter_group(batch: Batch, name: str) -> Any:
+    """Return the NamedTuple of a group of parameters of a single run, as floats."""
     values: Any = batch.parameters[:, 0].tolist()
     return group_of(name, batch.program.parameter_rows(), values)
 

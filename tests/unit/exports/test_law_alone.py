@@ -1,4 +1,4 @@
-"""The law alone, in C and as a functional mock-up unit: it gives the commands of the run, from what its sensors show."""
+"""The law alone, in C and as a functional mock-up unit: from what the sensors show it gives the commands of the run."""
 
 import ctypes
 import importlib

@@ -6,27 +6,26 @@ angle and pressures, and those of a valve whose command depends on the pressures
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
+from ppafo.control.kind import ControllerKind
 from ppafo.engine.entries import HEADER, INLINE, indent
 from ppafo.engine.lanes import Batch, LaneBlock, effort_for, load_program
 from ppafo.engine.linking import link_program
-from ppafo.engine.rows import group_of, leaf_paths, leaves, row_expression, row_numbers
+from ppafo.engine.rows import leaf_paths, leaves, row_expression, row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library import check_law
-from ppafo.exports.c_library.library import ExportedProgram
 from ppafo.exports.c_library.files import library_files, members_of
-from ppafo.exports.c_library.library import Library, LibraryApi, c_identifier
+from ppafo.exports.c_library.library import ExportedProgram, Library, LibraryApi, c_identifier
 from ppafo.exports.c_library.plant import Drive, Input, PlantAlone
 from ppafo.exports.c_library.program import readable_c, struct_of_numbers
 from ppafo.exports.c_library.settings import settings_of
 from ppafo.model.ports import sent_command
 from ppafo.model.sensors import GaitMeasurement, Measurement
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.python_controller import SampledRun
+from ppafo.simulation.python_controller import SampledRun, parameter_group
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario, with_control
 from ppafo.translation.value_types import FLOAT
 
@@ -53,6 +52,7 @@ class _LawText:
     """Law of one batch as text: numbers of the plant as constants, settings and state as members of structs."""
 
     batch: Batch
+    law: ControllerKind
 
     @property
     def measured(self) -> Any:
@@ -62,29 +62,25 @@ class _LawText:
     @property
     def states(self) -> dict[str, str]:
         """Names of the state in C, by path."""
-        assert self.batch.program.controller is not None, "a law decides"
-        paths = leaf_paths(type(self.batch.program.controller.initial), "")
-        return {path: c_identifier(path) for path in paths}
+        return {path: c_identifier(path) for path in leaf_paths(type(self.law.initial), "")}
 
     def constant(self, name: str, collector: SourceCollector) -> str:
         """Return the text of a group of parameters with its numbers. Raises ProgramError for a group of states."""
-        rows = self.batch.program.parameter_rows()
-        if name not in rows:
+        row = self.batch.program.parameter_rows().get(name)
+        if row is None:
             raise ProgramError(f"the law reads '{name}', a state of the plant, and cannot be exported alone")
-        numbers = self.group(name)
-        cells = dict(zip(leaf_paths(rows[name], name), map(repr, leaves(numbers)), strict=True))
-        return row_expression(rows[name], name, cells, collector.add)
-
-    def group(self, name: str) -> Any:
-        """Return the numbers of a group of parameters."""
-        return group_of(name, self.batch.program.parameter_rows(), self.batch.parameters[:, 0].tolist())
+        numbers = map(repr, leaves(parameter_group(self.batch, name)))
+        return row_expression(row, name, dict(zip(leaf_paths(row, name), numbers, strict=True)), collector.add)
 
     def __call__(self, library: Library, title: str, around: str) -> str:
         """Return the C functions ``decide`` and ``observe`` for a library; ``around`` declares their structs."""
         program = self.batch.program
         collector = SourceCollector(INLINE)
         link_program(program, collector.replacements)
-        entries = [self._decide(collector), self._observe(collector)]
+        torque = collector.add(program.actuator.torque)
+        seen = "measurement.angle, measurement.pressure_1, measurement.pressure_2"
+        observed = [f"measurement.torque = {torque}({self.constant('plant', collector)}, {seen})"]
+        entries = [self._decide(collector), self._entry("observe(measurement)", observed, collector)]
         composed = "\n\n".join([HEADER, collector.text(), *entries, ""])
         name = library.name
         settings = struct_of_numbers(f"{name}_settings", [setting.name for setting in library.settings])
@@ -96,8 +92,7 @@ class _LawText:
     def _decide(self, collector: SourceCollector) -> str:
         """Return the source of a sample, as ``engine.step.sample.control`` takes it."""
         program = self.batch.program
-        law = program.controller
-        assert law is not None, "a law decides"
+        law = self.law
         settings = (f"settings.{c_identifier(f'controller.{quantity.name}')}" for quantity in law.quantities)
         of_settings = dict(zip(leaf_paths(law.parameters, "controller"), settings, strict=True))
         of_state = {f"state{path}": f"state.{name}" for path, name in self.states.items()}
@@ -118,13 +113,6 @@ class _LawText:
         lines += [f"state.{COMMAND} = command"]
         return self._entry("decide(settings, state, reference, measurement)", lines, collector)
 
-    def _observe(self, collector: SourceCollector) -> str:
-        """Return the source of the torque of a measurement, from its angle and pressures."""
-        torque = collector.add(self.batch.program.actuator.torque)
-        plant = self.constant("plant", collector)
-        seen = "measurement.angle, measurement.pressure_1, measurement.pressure_2"
-        return self._entry("observe(measurement)", [f"measurement.torque = {torque}({plant}, {seen})"], collector)
-
     def _entry(self, head: str, lines: list[str], collector: SourceCollector) -> str:
         """Return a function whose calls get the constants of effects that they need."""
         passed = composed_lines(lines, collector.needs)
@@ -140,11 +128,11 @@ def law_of(scenario: Scenario) -> PlantAlone:
     """
     check_law(scenario)
     batch = batch_of(plan_run(scenario))
-    text = _LawText(batch)
     law = batch.program.controller
     assert law is not None, "a law decides"
+    text = _LawText(batch, law)
     # The samples of the engine, whose period is a whole number of its steps.
-    period = text.group("timing").period
+    period = parameter_group(batch, "timing").period
     recorded = scenario.run.output_interval
     settings = tuple(
         replace(setting, value=period) if setting.path == PERIOD else setting
@@ -208,7 +196,7 @@ def _samples(scenario: Scenario, late: int) -> Iterator[tuple[float, float, Any,
     block = LaneBlock(load_program(program, effort_for(batch)), program, batch.clock, batch.parameters, batch.states)
     outside = with_control(scenario, Control(PYTHON_CONTROLLER, {}, scenario.controller.period))
     sampled = SampledRun(batch_of(plan_run(outside)))
-    period = _LawText(batch).group("timing").period
+    period = parameter_group(batch, "timing").period
     for sample in range(min(sampled.samples, MOST_SAMPLES)):
         measurement = sampled.measurement()
         reference = sampled.reference

@@ -41,8 +41,8 @@ _LOOP = (
     "the run, the metrics of ramp and hold keep the times of the initial reference.",
 )
 _PLANT = (
-    "Inputs are read at the beginning of a communication step, a multiple of <code>{steps}</code>. {motion} There is no "
-    "stop time.",
+    "Inputs are read at the beginning of a communication step, a multiple of <code>{steps}</code>. {motion} There "
+    "is no stop time.",
     "They take effect at the next communication step.",
 )
 """Time stepping of a closed loop and of a plant, and when changed parameters take effect, for the page of the unit."""
