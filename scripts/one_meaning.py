@@ -27,7 +27,6 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from ppafo.engine.run import batch_of
 from ppafo.errors import PpafoError
 from ppafo.exports.c_library import library_of
-from ppafo.exports.c_library.library import COUNTS
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.library import COUNTS
 from ppafo.loading import load_scenario
