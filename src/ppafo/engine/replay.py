@@ -11,9 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ppafo.control.kind import ProfileKind
+from ppafo.engine.in_python import functions_of
 from ppafo.engine.lane_rows import lanes_of
 from ppafo.engine.lanes import Batch, BatchResult, Floats, begin_block, join_results
-from ppafo.engine.rows import group_of, leaf_paths, leaves, of_each, row_numbers
+from ppafo.engine.rows import group_of, leaves, of_each, row_numbers
+from ppafo.model.ports import at_valve
 
 COMMAND = "result.command"
 """Path of the present command among the states of a program."""
@@ -101,42 +103,55 @@ def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
 
 
 def _started(batch: Batch, earlier: Floats) -> tuple[Floats, Floats]:
-    """Return initial states (rows, runs) with valves as after earlier commands (steps,), and these (steps, runs).
+    """Return initial states (rows, runs) with valves and effects as after earlier commands (steps,), and these.
 
-    For a first one that is not known stands the command that holds the pressures at the start.
+    The commands (steps, runs) have for a first one that is not known that which holds the pressures at the start.
     """
     program = batch.program
     delay = batch.clock.command_delay
-    states = batch.states.copy()
     valve = program.valve
-    kinds = program.parameter_rows()
+    states = batch.states.copy()
     # The last ones have not arrived yet.
     arrived = earlier[: max(1, earlier.size - delay)]
     changes = np.flatnonzero(np.diff(arrived)) + 1
+    rows_at_start = dict[str, Any]()
+    # Laws of effects act on commands and in the valve, as in a step.
+    linked = functions_of(program, rows_at_start)
+    at_port, settle, next_event, advance = map(linked.of, (at_valve, valve.settle, valve.next_event, valve.advance))
 
-    def at_start(own: Any, timing: Any, plant: Any, state: Any) -> tuple[float, Any]:
-        pressures = program.actuator.pressures(plant, state.angle, state.mass_1, state.mass_2)
+    def at_start(rows: Mapping[str, Any]) -> tuple[Any, ...]:
+        rows_at_start.update(rows)
+        timing = rows["timing"]
+        state = rows["state"]
+        parameters = rows["valve"]
+        pressures = program.actuator.pressures(rows["plant"], state.angle, state.mass_1, state.mass_2)
         first = float(arrived[0])
         if math.isnan(first):
-            first = 0.0 if valve.command_for is None else valve.command_for(own, 0.0, *pressures)
+            first = 0.0 if valve.command_for is None else valve.command_for(parameters, 0.0, *pressures)
         begins = (changes - earlier.size + delay + timing.command_lag) * timing.step
-        shown = valve.state()
+        valve_state = valve.state()
         time = _LONG_AGO
         for command, end in zip([first, *arrived[changes].tolist()], [*begins.tolist(), 0.0], strict=True):
+            for name, kind in program.stated.items():
+                if kind.settle is not None:
+                    before = rows_at_start[f"{name}_state"]
+                    rows_at_start[f"{name}_state"] = kind.settle(rows[name], before, command)
+            asked = at_port(command)
             if time == _LONG_AGO and valve.holding is not None:
-                shown = valve.holding(own, command, *pressures)
+                valve_state = valve.holding(parameters, asked, *pressures)
                 time = end
             while time < end:
-                settled = valve.settle(own, shown, command, time)
-                until = min(end, max(valve.next_event(own, settled, command, time), time + _LEAST_PART))
-                _, shown = valve.advance(own, shown, command, time, until - time)
+                settled = settle(parameters, valve_state, asked, time)
+                event = next_event(parameters, settled, asked, time)
+                until = min(end, max(event, time + _LEAST_PART))
+                _, valve_state = advance(parameters, valve_state, asked, time, until - time)
                 time = until
-        return first, shown
+        return first, valve_state, *(rows_at_start[name] for name in program.effect_states)
 
-    state_kinds = program.state_rows()
-    given = (group_of(name, kinds, batch.parameters) for name in ("valve", "timing", "plant"))
-    first, shown = of_each(at_start, *given, group_of("state", state_kinds, states))
-    numbers = row_numbers(state_kinds)
-    for path, values in zip(leaf_paths(valve.state, "valve_state"), leaves(shown), strict=True):
+    tables = (program.parameter_rows(), batch.parameters), (program.state_rows(), states)
+    first, *begun = of_each(at_start, {name: group_of(name, *table) for table in tables for name in table[0]})
+    kinds = {"valve_state": valve.state, **program.effect_states}
+    numbers = row_numbers(program.state_rows())
+    for path, values in zip(row_numbers(kinds), leaves(begun), strict=True):
         states[numbers[path]] = values
     return states, np.where(np.isnan(earlier[:, None]), first, earlier[:, None])

@@ -1,6 +1,5 @@
 """Inputs of a run from a recording, at each step: command, supply pressures, external torque and angle."""
 
-import math
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 
@@ -20,10 +19,8 @@ from ppafo.simulation.recorded.channels import (
     SUPPLY,
     between_stops,
 )
-from ppafo.simulation.recorded.rest import motion_at
+from ppafo.simulation.recorded.rest import LONGEST_ONSET, command_ahead
 
-_HISTORY = 0.25
-"""Time before the start for which a valve follows the recorded commands [s], longer than any dead time."""
 _SUPPLY_PATH = "plant.supply_pressure"
 _DORSIFLEXION_PATH = "plant.dorsiflexion_pressure"
 
@@ -64,14 +61,11 @@ def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
     if COMMAND in inputs.names:
         command = _values_at_steps(inputs, COMMAND, run)
         begin = float(recording.time[0])
-        # A recording that begins in motion under a command begins after it, and one at rest begins with it: the vane
-        # cannot have been set in motion at once; a pressure may.
-        first = recording[COMMAND][:1]
-        has_stood = first.any() and motion_at(recording, begin) is not None
-        count = int(min(inputs.start - begin, _HISTORY) / run.step)
+        count = int(min(inputs.start - begin, LONGEST_ONSET) / run.step)
         before = _values_at_steps(inputs, COMMAND, run, -count)[:count]
-        # Ahead of them stands the first command, or what holds the pressures at the start.
-        earlier = np.concatenate([first if has_stood else [math.nan], before])
+        # Ahead of the history stands its own first command, ahead of a recording what holds its state.
+        ahead = before[0] if inputs.start - begin > LONGEST_ONSET else command_ahead(recording, device)
+        earlier = np.append(ahead, before)
     # The parameters that follow a recording [SI], for every step.
     followed: dict[str, Floats] = {}
     # Later ones prevail: a regulator with a recording of its own does not follow the supply.

@@ -6,8 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import DataError
+from ppafo.model.catalog import VALVES
 from ppafo.parameters.device import Device
+from ppafo.parameters.plant import first_settings
 from ppafo.signals import Recording
 from ppafo.signals.faults import noise_of, resolution_of
 from ppafo.signals.recording import Floats
@@ -35,6 +38,18 @@ _DEVIATION_OF_MEDIAN = 1.4826
 """Standard deviation of normal noise divided by its median absolute value: 1 / (0.75 quantile of a standard normal)."""
 _LEAST_RANK = 1.0e-6
 """Smallest singular value divided by the largest for which powers of time count as independent."""
+
+LONGEST_ONSET = 0.25
+"""Time after which a valve has followed a command, longer than any dead time [s]."""
+# Least noise as a fraction of the range of a channel, and change that shows a motion without doubt, in noises [-].
+_LEAST_OF_RANGE = 1.0e-4
+_CLEAR = 20.0
+_AT_END = 0.3 * PASCALS_PER_PSI
+"""Usual zero of a pressure sensor, within which a chamber is at the atmosphere or at its supply [Pa]."""
+# Fraction of a motion done in half of its time [-], from which it has not begun in this time: steady, it is 0.5; and
+# least time at rest that a valve without a motion holds [times until the flow follows].
+_HALF = 0.4
+_STANDING = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +87,40 @@ def motion_at(recording: Recording, start: float) -> tuple[float, float, float] 
         velocity = float(coefficients[2])
         found = angle, velocity, _SURE * max(noise, scatter) * math.sqrt(float(covariance[2, 2]))
     return found if found is not None and abs(found[1]) > _LEAST_VELOCITY + _SEEN * found[2] else None
+
+
+def command_ahead(recording: Recording, device: Device) -> float:
+    """Return the command [-] that has stood before a recording: its first one, or not a number where it begins later.
+
+    A pressure that a command moves from its first sample on begins flat, for as long as the valve takes to follow, or
+    from the pressure of the atmosphere or of its supply; one that has moved before has its slope at once. Where nothing
+    moves until the command changes, for longer than the valve takes, the valve holds it.
+    """
+    time = recording.time - recording.time[0]
+    command = recording[COMMAND]
+    supply = device.supply
+    kind = VALVES[device.valve.kind]
+    settings = first_settings(device.valve)
+    onset = (kind.lag or kind.choose(settings).command_delay)(settings)
+    first = time.size
+    moves = False
+    for name, fed in (("pressure_1", supply.pressure), ("pressure_2", supply.dorsiflexion_pressure)):
+        values = recording[name] if name in recording else np.zeros(1)
+        least = max(read_error(recording, name), _LEAST_OF_RANGE * float(np.ptp(values)))
+        away = np.flatnonzero(np.abs(values - values[0]) > _CLEAR * least)
+        # The chamber that moves first tells.
+        if away.size and away[0] < first:
+            first = int(away[0])
+            last = max(2, first)
+            # Half of a steady motion is done after half of the time, and less of one that has begun since.
+            curve = np.polyfit(time[: last + 1] / time[last], values[: last + 1], 2)
+            half, whole = np.polyval(curve, [0.5, 1.0]) - curve[2]
+            end = supply.atmospheric_pressure if whole > 0.0 else fed
+            moves = time[last] < LONGEST_ONSET and half / whole > _HALF and abs(values[0] - end) > _AT_END
+    change = int(np.argmax(np.append(command[:-1] != command[0], True)))
+    is_held = change <= first and time[change] > max(_STANDING * onset, REST_WINDOW)
+    has_stood = moves or is_held or motion_at(recording, float(recording.time[0])) is not None
+    return float(command[0]) if has_stood else math.nan
 
 
 def read_error(recording: Recording, name: str) -> float:
